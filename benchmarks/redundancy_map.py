@@ -29,9 +29,9 @@ from selfmotion.shell.cli.tables import console
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from support.redundancy_oracle import Bodies, Oracle, borders
+from support.redundancy_oracle import Bodies, Oracle
 
-# Share of pixels away from borders that may differ.
+# Share of pixels that may differ; none is left out beside borders.
 ALLOWED_SHARE = 0.005
 # Reasons that the brute force does not look at: what has them is allowed otherwise.
 NOT_JUDGED = (Reason.ALLOWED, Reason.SINGULAR, Reason.SPEED)
@@ -50,9 +50,8 @@ class Compared:
         Of redundancy.
     seconds : float
         For a map of the usual size.
-    pixels, borders, wrong, wrong_inside, wrong_on_line : int
-        All pixels compared; those with a neighbour of another state; those that differ; of these
-        the ones that are no borders; and the ones on the plan's line.
+    pixels, wrong, wrong_on_line : int
+        All pixels compared; those that differ; and of these the ones on the plan's line.
     """
 
     name: str
@@ -60,16 +59,13 @@ class Compared:
     degrees: int
     seconds: float
     pixels: int
-    borders: int
     wrong: int
-    wrong_inside: int
     wrong_on_line: int
 
     @property
     def is_right(self) -> bool:
         """Whether few enough pixels differ, and none on the plan's line."""
-        inside = self.pixels - self.borders
-        return self.wrong_inside <= ALLOWED_SHARE * inside and not self.wrong_on_line
+        return self.wrong <= ALLOWED_SHARE * self.pixels and not self.wrong_on_line
 
 
 class Meetings:
@@ -109,26 +105,22 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
     found.redundancy_map()
     seconds = time.perf_counter() - began
     shown = found.redundancy_map(shape=(columns, rows))
-    wrong, border = _differences(found, shown, problem, starts)
+    wrong = _differences(found, shown, problem, starts)
     nearest = np.abs(shown.coordinate - shown.plan_line[:, None]).argmin(axis=1)
-    on_line = wrong[np.arange(columns), nearest] & ~border[np.arange(columns), nearest]
+    on_line = wrong[np.arange(columns), nearest]
     return Compared(
         problem.name,
         shown.label,
         shown.redundancy,
         seconds,
         wrong.size,
-        int(border.sum()),
         int(wrong.sum()),
-        int((wrong & ~border).sum()),
         int(on_line.sum()),
     )
 
 
-def _differences(
-    found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int
-) -> tuple[Flags, Flags]:
-    """Return which pixels differ (N, M), and which have neighbours of another state."""
+def _differences(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Flags:
+    """Return which pixels differ, (N, M)."""
     model, required = found.problem.envelope.bodies[0]
     own = found.trajectory(shown.times)
     oracle = Oracle(found.problem, shown, own, (), (), required, starts)
@@ -147,7 +139,7 @@ def _differences(
     said = np.where(np.isin(shown.state, NOT_JUDGED), int(Reason.ALLOWED), shown.state)
     said = np.where(np.isin(said, OF_BODIES), int(Reason.ITSELF), said)
     brute = np.where(meets, int(Reason.ITSELF), state)
-    return said != brute, borders(said) | borders(brute)
+    return np.asarray(said != brute)
 
 
 def main(
@@ -159,7 +151,7 @@ def main(
 ) -> None:
     """Compare the map of every problem of the suite with brute force."""
     table = Table(box=tables.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    heads = ("problem", "coordinate", "degrees", "map", "pixels", "differ", "inside", "on the line")
+    heads = ("problem", "coordinate", "degrees", "map", "pixels", "differ", "on the line")
     for head in heads:
         table.add_column(head, overflow="fold")
     every = []
@@ -168,8 +160,6 @@ def main(
             continue
         item = compared(load(folder), columns, rows, starts, seed)
         every.append(item)
-        inside = item.pixels - item.borders
-        share = f"{item.wrong_inside} of {inside}"
         table.add_row(
             item.name,
             item.coordinate,
@@ -177,7 +167,6 @@ def main(
             f"{item.seconds:.2f} s",
             str(item.pixels),
             str(item.wrong),
-            share,
             str(item.wrong_on_line),
         )
         print(item, flush=True)

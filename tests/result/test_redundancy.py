@@ -173,14 +173,12 @@ def test_a_panda_is_as_brute_force_has_it():
     model, required = plan.problem.envelope.bodies[0]
     own = plan.trajectory(shown.times)
     oracle = Oracle(plan.problem, shown, own, model.obstacles, model.pairs, required)
-    # No border is left out: both look at the middle of a pixel.
     columns = [4, 13]
-    found = oracle.compare(columns)
-    assert not found.wrong.any()
+    assert not oracle.differs(columns).any()
     # The brute force sees what is shifted by a pixel.
     state = np.roll(shown.state, 1, axis=1)
-    broken = replace(oracle, shown=replace(shown, state=state)).compare(columns)
-    assert broken.wrong.mean() > 0.005
+    broken = replace(oracle, shown=replace(shown, state=state)).differs(columns)
+    assert broken.mean() > 0.005
 
 
 def test_a_branch_that_is_not_the_plans_is_told_from_it():
@@ -192,6 +190,20 @@ def test_a_branch_that_is_not_the_plans_is_told_from_it():
     # From pixel to pixel of 12° joints go on: they do not jump to the arm's other configurations,
     # which are turns of more than two joints by some π away.
     assert np.nanmax(far) < np.pi
+
+
+def test_a_slice_moves_joints_no_more_than_it_has_to():
+    plan = plan_of("panda", "pointing")
+    shown = plan.redundancy_map("panda_joint7", shape=FEW)
+    assert shown.redundancy == 2
+    for i, j in [(2, 10), (6, 15), (9, 20)]:
+        step = shown.q[i, j + 1] - shown.q[i, j]
+        middle = 0.5 * (shown.q[i, j + 1] + shown.q[i, j])
+        rows = np.vstack([plan.problem.follows.jacobian(middle), np.eye(7)[6]])
+        aside = step - np.linalg.pinv(rows) @ (rows @ step)
+        # What moves neither the tool nor the joint; second order in a step of 11°.
+        assert np.linalg.norm(aside) < 0.02 * np.linalg.norm(step)
+        assert np.linalg.norm(step) > 0.1
 
 
 def test_costs_are_those_of_no_self_motion():

@@ -30,7 +30,7 @@ NEAR = 0.35
 # Starts where none of a pixel's solutions is as near: some branches are reached from one in fifty.
 MORE_STARTS = 600
 # Halvings of the way from one pixel to the next where the branch goes far between them.
-HALVINGS = 4
+HALVINGS = 8
 # Differences of central differences of a coordinate [s of the joints' motion].
 STEP = 1e-6
 
@@ -241,26 +241,6 @@ class Bodies:
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
-    """Where a map and brute force say different things.
-
-    Attributes
-    ----------
-    wrong : (N, M)
-        Pixels that differ.
-    border : (N, M)
-        Pixels with a neighbour of another state, in the map or by brute force: what decides there
-        changes within half a pixel of them.
-    state : (N, M)
-        What brute force says: a `Reason`.
-    """
-
-    wrong: Flags
-    border: Flags
-    state: Ints
-
-
-@dataclass(frozen=True, eq=False)
 class Oracle:
     """Finds a plan's map by brute force.
 
@@ -376,26 +356,17 @@ class Oracle:
             state[inside] = np.where(near, said, int(Reason.ALLOWED))
         return state
 
-    def compare(self, rows: Any = None) -> Difference:
-        """Return where the map differs from brute force, of some columns of it."""
-        chosen = np.arange(len(self.shown.times)) if rows is None else np.asarray(rows)
+    def differs(self, columns: Any = None) -> Flags:
+        """Return where the map says something else, of some columns of it, (N, M).
+
+        Both look at the middles of pixels: none is left out beside borders.
+        """
+        chosen = np.arange(len(self.shown.times)) if columns is None else np.asarray(columns)
         state, _ = self.states(chosen)
         shown = self.shown.state[chosen].copy()
         # Singular poses and speeds are other checks: they are looked at after all others.
         shown[(shown == Reason.SINGULAR) | (shown == Reason.SPEED)] = int(Reason.ALLOWED)
-        return Difference(shown != state, borders(self.shown.state)[chosen] | borders(state), state)
-
-
-def borders(state: Ints) -> Flags:
-    """Return the mask of pixels with a neighbour of another state, in time or upwards, (N, M)."""
-    found = np.zeros(state.shape, dtype=bool)
-    for axis in (0, 1):
-        differs = np.diff(state, axis=axis) != 0
-        first, second = [slice(None)] * 2, [slice(None)] * 2
-        first[axis], second[axis] = slice(None, -1), slice(1, None)
-        found[tuple(first)] |= differs
-        found[tuple(second)] |= differs
-    return found
+        return np.asarray(shown != state)
 
 
 def _unlike(q: Array) -> Array:

@@ -181,20 +181,13 @@ def _reaches(
     code: Ints,
     reference: Array,
     locked: Flags,
-    r: Array,
-    p: Array,
-    rotations: Array,
-    positions: Array,
-    jacobians: Array,
-    error: Array,
-    rows: Array,
-    factor: Array,
-    slope: Array,
+    work: tuple[Array, ...],
 ) -> bool:
     """Whether Newton's method comes from `here` (n,) to the value `goal` nearby; `trial` is there.
 
     On [F(q) = x; c(q) = s], with corrections [J; ∂c/∂q]⁺ of least norm.
     """
+    r, p, rotations, positions, jacobians, error, rows, factor, slope = work
     n, m = len(here), len(error) - 1
     trial[:] = here
     first, length = 0.0, np.inf
@@ -202,7 +195,9 @@ def _reaches(
         place_tips(trial, chains, r, p, rotations, positions, jacobians)
         clear_held(locked, jacobians)
         errors_and_rows(layout, target, jacobians, rotations, positions, error, rows)
-        value = _value(code, reference, trial, target, chains, r, p, rotations, jacobians, slope)
+        value = _value(
+            code, reference, trial, target, chains, r, p, rotations, jacobians, slope
+        )  # fmt: skip
         error[m] = goal - value if code[0] == OWN else wrapped_angle(goal - value)
         for j in range(n):
             rows[m, j] = 0.0 if locked[j] else slope[j]
@@ -230,6 +225,22 @@ def _reaches(
     return bool(length < _CONVERGED and np.sqrt(moved) <= _FARTHEST * first + _CONVERGED)
 
 
+@inlined
+def _work(tips: int, joints: int, n: int, m: int) -> tuple[Array, ...]:
+    """Return arrays to work in: places on a chain, tips, Jacobians, and m + 1 rows."""
+    return (
+        np.empty((joints, 3, 3)),
+        np.empty((joints, 3)),
+        np.empty((tips, 3, 3)),
+        np.empty((tips, 3)),
+        np.zeros((tips, 6, n)),
+        np.empty(m + 1),
+        np.empty((m + 1, n)),
+        np.empty((m + 1, m + 1)),
+        np.empty(n),
+    )
+
+
 @kernel
 def continue_all(
     q: Array,
@@ -249,12 +260,8 @@ def continue_all(
     halved where they are too long. Targets are (N, 12 F); joints that are `locked` (N, n) rest.
     Sets `found` (N, M, n): NaN from where a branch ends. Angles may be beyond ±π.
     """
-    n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
-    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
-    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
-    jacobians = np.zeros((tips, 6, n))
-    error, rows = np.empty(m + 1), np.empty((m + 1, n))
-    factor, slope = np.empty((m + 1, m + 1)), np.empty(n)
+    n = q.shape[1]
+    work = _work(layout.shape[0], chains.shape[1], n, rows_of(layout))
     here, trial = np.empty(n), np.empty(n)
     found[:] = np.nan
     for k in range(len(q)):
@@ -268,25 +275,9 @@ def continue_all(
                     there = min(1.0, gone + share)
                     goal = value + there * (wanted[at] - value)
                     if _reaches(
-                        goal,
-                        here,
-                        trial,
-                        targets[k],
-                        chains,
-                        layout,
-                        code,
-                        reference,
-                        locked[k],
-                        r,
-                        p,
-                        rotations,
-                        positions,
-                        jacobians,
-                        error,
-                        rows,
-                        factor,
-                        slope,
-                    ):
+                        goal, here, trial, targets[k], chains, layout, code, reference,
+                        locked[k], work,
+                    ):  # fmt: skip
                         gone, share = there, 2.0 * share
                         here[:] = trial
                     else:

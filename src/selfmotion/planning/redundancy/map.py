@@ -17,7 +17,6 @@ from selfmotion.basics import (
     as_path,
     as_whole,
     read_archive,
-    read_only,
     write_archive,
 )
 from selfmotion.model.motion import Trajectory
@@ -231,40 +230,41 @@ def redundancy_map_of(
     axis = axis_of(formulation, times, z, coordinate)
     line = _line(formulation, axis, motion, times)
     start = _line(formulation, axis, initial, times)
-    known = np.isfinite(start)
-    if axis.turns and known.any():
+    if axis.turns:
         start -= 2.0 * np.pi * np.round((start[0] - line[0]) / (2.0 * np.pi))
-    values = axis.grid([line, start[known]], rows)
+    values = axis.grid([line, start[np.isfinite(start)]], rows)
     found = _continued(formulation, axis, times, z, values)
-    reached = ~np.isnan(found).any(axis=2)
-    moments = np.broadcast_to(times[:, None], reached.shape)[reached]
-    judge = Judge(formulation)
-    state = np.full(reached.shape, int(Reason.NO_CONFIGURATION), dtype=np.int64)
-    cause, cost = np.full(reached.shape, -1, dtype=np.int64), np.full(reached.shape, np.nan)
-    own = LocalMotion(formulation, times, z)
-    least = float(own.singular_values.max())
-    if reached.any():
-        local = LocalMotion(formulation, moments, np.ascontiguousarray(found[reached]))
-        least = NEAR_SINGULAR * max(least, float(local.singular_values.max()))
-        state[reached], cause[reached] = judge.judge(local, least)
-        cost[reached] = local.cost()
-    plan_state, _ = judge.judge(own, least)
+    judged = _judged(formulation, times, z, found)
     return RedundancyMap(
         axis.label,
         axis.unit,
         formulation.robot.joint_names,
         formulation.follows.redundancy,
-        read_only(times),
-        read_only(values),
-        state,
-        cause,
-        tuple(judge.causes),
-        cost,
-        np.array(found[:, :, : formulation.robot.dof]),
-        line,
-        plan_state,
-        start,
+        times,
+        values,
+        q=np.array(found[:, :, : formulation.robot.dof]),
+        plan_line=line,
+        minimum_norm_line=start,
+        **judged,
     )
+
+
+def _judged(formulation: Formulation, times: Array, z: Array, found: Array) -> dict[str, Any]:
+    """Return what stops configurations (N, M, n) and the plan's own (N, n), and what they cost."""
+    reached = ~np.isnan(found).any(axis=2)
+    state = np.full(reached.shape, int(Reason.NO_CONFIGURATION), dtype=np.int64)
+    cause, cost = np.full(reached.shape, -1, dtype=np.int64), np.full(reached.shape, np.nan)
+    judge, own = Judge(formulation), LocalMotion(formulation, times, z)
+    least = NEAR_SINGULAR * float(own.singular_values.max())
+    if reached.any():
+        moments = np.broadcast_to(times[:, None], reached.shape)[reached]
+        local = LocalMotion(formulation, moments, np.ascontiguousarray(found[reached]))
+        least = max(least, NEAR_SINGULAR * float(local.singular_values.max()))
+        state[reached], cause[reached] = judge.judge(local, least)
+        cost[reached] = local.cost()
+    plan_state, _ = judge.judge(own, least)
+    given = {"state": state, "cause": cause, "cost": cost, "plan_state": plan_state}
+    return {**given, "causes": tuple(judge.causes)}
 
 
 def _shape(shape: tuple[int, int]) -> tuple[int, int]:

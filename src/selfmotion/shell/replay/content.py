@@ -21,7 +21,7 @@ from selfmotion.shell.replay.motion import (
     self_motion,
     torque_limits,
 )
-from selfmotion.shell.replay.redundancy import packed_map, tree
+from selfmotion.shell.replay.redundancy import map_of, packed_map, tree
 from selfmotion.shell.replay.whole import Whole, describe, table
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
@@ -205,7 +205,7 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
-        "redundancy": None if whole else packed_map(motion.plan.redundancy_map(), payload),
+        "redundancy": None if whole else packed_map(map_of(motion.plan), payload),
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {

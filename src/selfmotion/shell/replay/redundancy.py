@@ -9,16 +9,20 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.redundancy import (
     COST_COLORS,
     LEGEND,
+    PIXELS,
     Reason,
     RedundancyMap,
     excess_cost,
     shown_scale,
 )
+from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json, Payload
 
 # Steps of a joint's range, and of the range of costs, in which numbers travel: of a turn 0.1 mrad,
 # of costs less than a shade that can be told from the next.
 _JOINT_STEPS, _COST_STEPS = 2**16 - 1, 2**8 - 1
+# Pixels where bodies are not convex: searching their surfaces takes twenty times as long as hulls.
+_FEWER_PIXELS = (61, 61)
 # Stands for no cause.
 _NO_CAUSE = 2**16 - 1
 
@@ -35,6 +39,12 @@ def tree(robot: RobotModel, payload: Payload) -> Json:
         "revolute": arrays.is_revolute.tolist(),
         "scales": arrays.scales.tolist(),
     }
+
+
+def map_of(plan: Plan) -> RedundancyMap:
+    """Return the map of a plan for a page: of as many pixels as take about a second."""
+    are_convex = all(model.is_all_convex for model, _ in plan.problem.envelope.bodies)
+    return plan.redundancy_map(shape=PIXELS if are_convex else _FEWER_PIXELS)
 
 
 def packed_map(shown: RedundancyMap, payload: Payload) -> Json:

@@ -24,7 +24,7 @@ class RedundancyMap {
     this.figure = element(parent, "figure", { class: "map" });
     const caption = element(this.figure, "figcaption");
     element(caption, "span", {}, `Redundancy map: ${this.label} [${this.unit}]`);
-    element(caption, "span", { class: "at" }, this.slice ? "a slice through the plan" : "click: stand there");
+    element(caption, "span", { class: "at" }, `${this.slice ? "a slice; " : ""}click: stand there`);
     const frame = element(this.figure, "div", { class: "frame" });
     this.canvas = element(frame, "canvas", { width: this.t.length, height: this.values.length });
     this.svg = element(frame, "svg", { role: "img", "aria-label": `What stops the arm, by time and ${this.label}` });
