@@ -228,7 +228,7 @@ def test_lines_are_those_of_the_motions():
     assert np.abs(np.diff(shown.plan_line)).max() < 1.0
 
 
-def test_a_rail_and_a_table_are_the_coordinate(tmp_path):
+def test_a_rail_is_the_coordinate(tmp_path):
     file = tmp_path / "rail.urdf"
     file.write_text(
         """<robot name="rail"><link name="rail"/><link name="carriage"/>

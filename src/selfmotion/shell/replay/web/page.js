@@ -232,7 +232,7 @@ class Page {
   stand(q, cause) {
     this.standing = q;
     // In the place of the closest pair: the map stays where it is under the pointer.
-    get("pair").textContent = `standing aside: ${cause || "allowed"}`;
+    get("pair").textContent = `shown from the map: ${cause || "allowed"}`;
     get("pair").classList.toggle("meet", cause !== "");
     this.stage?.mark(cause.split(" "), this.plan.obstacles, true);
     for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], this.now);
