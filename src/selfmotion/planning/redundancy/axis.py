@@ -11,7 +11,7 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.robot import SwivelAngle, null_space
 from selfmotion.model.task import Task
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.redundancy.kernels import OWN, SWIVEL, TURN_OF_TOOL, values_at
+from selfmotion.planning.redundancy.kernels import OWN, SWIVEL, TURN_OF_TOOL
 
 # Names by which the coordinates other than joints are chosen.
 TOOL, ELBOW = "tool", "elbow"
@@ -66,12 +66,18 @@ class Axis:
         """Whether values that differ by whole turns are the same."""
         return bool(self.code[0] != OWN)
 
-    def along(self, follows: Follows, targets: Array, q: Array) -> Array:
-        """Return its values (K,) along a motion q (K, n) with targets (K, 12 F), without jumps."""
-        values = np.empty(len(q))
-        configurations = np.array(q, order="C")
-        values_at(configurations, targets, follows.chains, self.code, self.reference, values)
-        return np.asarray(np.unwrap(values)) if self.turns else self.size * values
+    def along(self, follows: Follows, t: Array, z: Array) -> Array:
+        """Return its values (K,) along a motion z (K, n) at times t (K,), without jumps."""
+        n = follows.robot.dof
+        if self.code[0] == OWN:
+            return np.asarray(self.size * z[:, self.code[1]])
+        if self.code[0] == SWIVEL:
+            return np.asarray(np.unwrap(SwivelAngle()(follows.robot, z[:, :n])[0]))
+        (item,) = follows.items
+        _, turns, _ = item.chain.along(z)
+        relative = np.einsum("kji,kjl->kil", item.target(t).rotation, turns)
+        about = relative[:, 1, 0] - relative[:, 0, 1]
+        return np.asarray(np.unwrap(np.arctan2(about, relative[:, 0, 0] + relative[:, 1, 1])))
 
     def grid(self, lines: list[Array], count: int) -> Array:
         """Return `count` values (M,) over its limits, or a turn, and over the plan's lines."""

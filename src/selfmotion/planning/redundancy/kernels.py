@@ -59,27 +59,6 @@ def _turn(target: Array, rotation: Array, jacobian: Array, slope: Array) -> floa
     return float(np.arctan2(about, along))
 
 
-@inlined
-def _moved_by(joints: int, chain: Array, r: Array, p: Array, point: Array, out: Array) -> None:
-    """Set `out` (3, n) to the velocities of a point on a chain by its first `joints` joints."""
-    out[:] = 0.0
-    axis = np.empty(3)
-    for j in range(joints):
-        k = int(chain[j, JOINT, 0])
-        for a in range(3):
-            axis[a] = 0.0
-            for b in range(3):
-                axis[a] += r[j + 1, a, b] * chain[j, AXIS, b] * chain[j, JOINT, 2]
-        x, y, z = (
-            point[0] - p[j + 1, 0],
-            point[1] - p[j + 1, 1],
-            point[2] - p[j + 1, 2],
-        )
-        out[0, k] += axis[1] * z - axis[2] * y
-        out[1, k] += axis[2] * x - axis[0] * z
-        out[2, k] += axis[0] * y - axis[1] * x
-
-
 @called
 def _swivel(code: Ints, reference: Array, chain: Array, r: Array, p: Array, slope: Array) -> float:
     """Return the `SwivelAngle` of the elbow, and set its slope (n,); NaN for a straight arm.
@@ -87,46 +66,62 @@ def _swivel(code: Ints, reference: Array, chain: Array, r: Array, p: Array, slop
     With e from the shoulder to the elbow, u the unit vector to the wrist, and the reference a:
     θ = atan2(e·(u × a), e·a - (e·u)(u·a)).
     """
-    n = len(slope)
     shoulder, elbow, wrist = p[code[1]], p[code[2]], p[code[3]]
-    moves = np.empty((3, 3, n))
-    _moved_by(code[1] - 1, chain, r, p, shoulder, moves[0])
-    _moved_by(code[2] - 1, chain, r, p, elbow, moves[1])
-    _moved_by(code[3] - 1, chain, r, p, wrist, moves[2])
-    a = reference
-    w, e = wrist - shoulder, elbow - shoulder
-    length = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
-    u = w / length
-    across = np.empty(3)
-    _cross(u, a, across)
-    eu, au, ea = _dot(e, u), _dot(a, u), _dot(e, a)
+    u, e, across = np.empty(3), np.empty(3), np.empty(3)
+    axis, du, de = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        u[i], e[i] = wrist[i] - shoulder[i], elbow[i] - shoulder[i]
+    length = np.sqrt(_dot(u, u))
+    for i in range(3):
+        u[i] /= length
+    _cross(u, reference, across)
+    eu, au, ea = _dot(e, u), _dot(reference, u), _dot(e, reference)
     y, x = _dot(e, across), ea - eu * au
     square = x * x + y * y
     if not square > _STRAIGHT**2:
         return np.nan
-    du, de, turned = np.empty(3), np.empty(3), np.empty(3)
-    for k in range(n):
+    for k in range(len(slope)):
+        slope[k] = 0.0
+    for j in range(code[3] - 1):
         for i in range(3):
-            du[i] = moves[2, i, k] - moves[0, i, k]
-            de[i] = moves[1, i, k] - moves[0, i, k]
+            axis[i] = du[i] = de[i] = 0.0
+            for b in range(3):
+                axis[i] += r[j + 1, i, b] * chain[j, AXIS, b] * chain[j, JOINT, 2]
+        _add_velocity(1.0, axis, p[j + 1], wrist, du)
+        if j < code[2] - 1:
+            _add_velocity(1.0, axis, p[j + 1], elbow, de)
+        if j < code[1] - 1:
+            _add_velocity(-1.0, axis, p[j + 1], shoulder, du)
+            _add_velocity(-1.0, axis, p[j + 1], shoulder, de)
+        # du = (I - uuᵀ) d(wrist - shoulder) / |wrist - shoulder|.
         along = _dot(du, u)
         for i in range(3):
             du[i] = (du[i] - along * u[i]) / length
-        _cross(du, a, turned)
-        dy = _dot(de, across) + _dot(e, turned)
-        dx = _dot(de, a) - (_dot(de, u) + _dot(e, du)) * au - eu * _dot(a, du)
-        slope[k] = (x * dy - y * dx) / square
+        dy, dx = _dot(de, across), _dot(de, reference) - (_dot(de, u) + _dot(e, du)) * au
+        dx -= eu * _dot(reference, du)
+        _cross(du, reference, de)
+        dy += _dot(e, de)
+        slope[int(chain[j, JOINT, 0])] += (x * dy - y * dx) / square
     return float(np.arctan2(y, x))
 
 
-@inlined
+@called
+def _add_velocity(sign: float, axis: Array, origin: Array, point: Array, out: Array) -> None:
+    """Add the velocity of a point by a turn about an axis to `out` (3,), times a sign."""
+    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    out[0] += sign * (axis[1] * z - axis[2] * y)
+    out[1] += sign * (axis[2] * x - axis[0] * z)
+    out[2] += sign * (axis[0] * y - axis[1] * x)
+
+
+@called
 def _cross(a: Array, b: Array, out: Array) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@inlined
+@called
 def _dot(a: Array, b: Array) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
@@ -149,25 +144,15 @@ def _value(
         return _turn(target, rotations[0], jacobians[0], slope)
     if code[0] == SWIVEL:
         return _swivel(code, reference, chains[0], r, p, slope)
-    slope[:] = 0.0
-    slope[code[1]] = 1.0
+    for k in range(len(slope)):
+        slope[k] = 1.0 if k == code[1] else 0.0
     return float(q[code[1]])
 
 
-@kernel
-def values_at(
-    q: Array, targets: Array, chains: Array, code: Ints, reference: Array, values: Array
-) -> None:
-    """Set `values` (K,) to the coordinate at each of q (K, n), whose targets are (K, 12 F)."""
-    n, tips = q.shape[1], chains.shape[0]
-    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
-    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
-    jacobians, slope = np.zeros((tips, 6, n)), np.empty(n)
-    for k in range(len(q)):
-        place_tips(q[k], chains, r, p, rotations, positions, jacobians)
-        values[k] = _value(
-            code, reference, q[k], targets[k], chains, r, p, rotations, jacobians, slope
-        )
+@called
+def _copy(given: Array, out: Array) -> None:
+    for k in range(len(out)):
+        out[k] = given[k]
 
 
 @called
@@ -189,7 +174,7 @@ def _reaches(
     """
     r, p, rotations, positions, jacobians, error, rows, factor, slope = work
     n, m = len(here), len(error) - 1
-    trial[:] = here
+    _copy(here, trial)
     first, length = 0.0, np.inf
     for count in range(_CORRECTIONS):
         place_tips(trial, chains, r, p, rotations, positions, jacobians)
@@ -252,23 +237,22 @@ def continue_all(
     reference: Array,
     locked: Flags,
     wanted: Array,
+    begins: Ints,
     found: Array,
 ) -> None:
     """Continue each of q (N, n) along its self-motion to the values `wanted` (M,) of a coordinate.
 
-    From its value `first` (N,) both ways, from one wanted value to the next, in steps that are
-    halved where they are too long. Targets are (N, 12 F); joints that are `locked` (N, n) rest.
-    Sets `found` (N, M, n): NaN from where a branch ends. Angles may be beyond ±π.
+    From its value `first` (N,), which is below the wanted ones from number `begins` (N,) on, both
+    ways, from one wanted value to the next, in steps that are halved where they are too long. Targets are (N, 12 F); joints that are `locked` (N, n) rest.
+    Sets `found` (N, M, n), as far as a branch goes. Angles may be beyond ±π.
     """
     n = q.shape[1]
     work = _work(layout.shape[0], chains.shape[1], n, rows_of(layout))
     here, trial = np.empty(n), np.empty(n)
-    found[:] = np.nan
     for k in range(len(q)):
-        begin = int(np.searchsorted(wanted, first[k]))
         for way in range(2):
-            at, value = begin - way, first[k]
-            here[:] = q[k]
+            at, value = begins[k] - way, first[k]
+            _copy(q[k], here)
             while 0 <= at < len(wanted):
                 gone, share = 0.0, 1.0
                 while gone < 1.0 and share >= _SMALLEST_SHARE:
@@ -279,10 +263,11 @@ def continue_all(
                         locked[k], work,
                     ):  # fmt: skip
                         gone, share = there, 2.0 * share
-                        here[:] = trial
+                        _copy(trial, here)
                     else:
                         share *= 0.5
                 if gone < 1.0:
                     break
-                found[k, at], value = here, wanted[at]
+                _copy(here, found[k, at])
+                value = wanted[at]
                 at += 1 - 2 * way

@@ -233,7 +233,7 @@ def redundancy_map_of(
     if axis.turns:
         start -= 2.0 * np.pi * np.round((start[0] - line[0]) / (2.0 * np.pi))
     values = axis.grid([line, start[np.isfinite(start)]], rows)
-    found = _continued(formulation, axis, times, z, values)
+    found = _continued(formulation, axis, times, z, line, values)
     judged = _judged(formulation, times, z, found)
     return RedundancyMap(
         axis.label,
@@ -284,13 +284,12 @@ def _line(formulation: Formulation, axis: Axis, motion: Trajectory, times: Array
     fine = np.interp(np.arange(_BETWEEN * (len(few) - 1) + 1) / _BETWEEN, np.arange(len(few)), few)
     fine = np.minimum(fine, motion.t[-1])
     z = formulation.completed(fine, motion(fine))
-    follows = formulation.follows
-    line[inside] = axis.along(follows, follows.targets(fine), z)[::_BETWEEN]
+    line[inside] = axis.along(formulation.follows, fine, z)[::_BETWEEN]
     return line
 
 
 def _continued(
-    formulation: Formulation, axis: Axis, times: Array, z: Array, values: Array
+    formulation: Formulation, axis: Axis, times: Array, z: Array, line: Array, values: Array
 ) -> Array:
     """Return the configurations at values (M,) continued from z (N, n), (N, M, n); NaN for none."""
     follows = formulation.follows
@@ -298,10 +297,12 @@ def _continued(
     targets, held = follows.targets(times), follows.held(times)
     # Plans are on their paths within a tolerance only.
     start, arrived = Manifold(follows, -everywhere, everywhere).project(z, targets, held=held)
-    first = axis.along(follows, targets, start)
+    first = axis.along(follows, times, start)
+    if axis.turns:
+        first -= 2.0 * np.pi * np.round((first - line) / (2.0 * np.pi))
     found = np.full((len(times), len(values), follows.dof), np.nan)
     on = np.flatnonzero(arrived)
-    part = np.empty((len(on), len(values), follows.dof))
+    part = np.full((len(on), len(values), follows.dof), np.nan)
     continue_all(
         np.ascontiguousarray(start[on]),
         np.ascontiguousarray(first[on] / axis.size),
@@ -312,6 +313,7 @@ def _continued(
         axis.reference,
         np.ascontiguousarray(held[on]),
         values / axis.size,
+        np.searchsorted(values, first[on]).astype(np.int64),
         part,
     )
     found[on] = part
