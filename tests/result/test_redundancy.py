@@ -272,6 +272,8 @@ def test_a_coordinate_is_chosen_by_name():
     assert faults(plan, shown) == []
     with pytest.raises(ProblemError, match="no coordinate 'panda_joint9'"):
         plan.redundancy_map("panda_joint9")
+    with pytest.raises(ProblemError, match="coordinate is 3, expected a joint"):
+        plan.redundancy_map(3)  # type: ignore[arg-type]
     with pytest.raises(ProblemError, match="does not leave free"):
         plan.redundancy_map("tool")
     with pytest.raises(ProblemError, match="seven revolute joints"):

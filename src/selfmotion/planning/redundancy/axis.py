@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, ProblemError, nearest
+from selfmotion.basics import Array, Ints, ProblemError, nearest, shown
 from selfmotion.model.follow import Follows
 from selfmotion.model.robot import SwivelAngle, null_space
 from selfmotion.model.task import Task
@@ -137,6 +137,10 @@ def axis_of(formulation: Formulation, times: Array, z: Array, chosen: str | None
 def _named(formulation: Formulation, z: Array, chosen: str) -> Axis:
     """Return the coordinate of a name."""
     robot, names = formulation.robot, formulation.coordinates.names
+    if not isinstance(chosen, str):
+        raise ProblemError(
+            f"{robot.name}: coordinate is {shown(chosen)}, expected a joint, '{TOOL}' or '{ELBOW}'"
+        )
     if chosen == TOOL:
         if not _turns_tool(formulation.follows):
             raise ProblemError(

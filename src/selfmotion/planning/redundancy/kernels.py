@@ -243,7 +243,8 @@ def continue_all(
     """Continue each of q (N, n) along its self-motion to the values `wanted` (M,) of a coordinate.
 
     From its value `first` (N,), which is below the wanted ones from number `begins` (N,) on, both
-    ways, from one wanted value to the next, in steps that are halved where they are too long. Targets are (N, 12 F); joints that are `locked` (N, n) rest.
+    ways, from one wanted value to the next, in steps that are halved where they are too long.
+    Targets are (N, 12 F); joints that are `locked` (N, n) rest.
     Sets `found` (N, M, n), as far as a branch goes. Angles may be beyond ±π.
     """
     n = q.shape[1]
