@@ -105,7 +105,7 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
     found.redundancy_map()
     seconds = time.perf_counter() - began
     shown = found.redundancy_map(shape=(columns, rows))
-    wrong = _differences(found, shown, problem, starts)
+    wrong = differences(found, shown, problem, starts)
     nearest = np.abs(shown.coordinate - shown.plan_line[:, None]).argmin(axis=1)
     on_line = wrong[np.arange(columns), nearest]
     return Compared(
@@ -119,7 +119,7 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
     )
 
 
-def _differences(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Flags:
+def differences(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Flags:
     """Return which pixels differ, (N, M)."""
     model, required = found.problem.envelope.bodies[0]
     own = found.trajectory(shown.times)

@@ -95,6 +95,8 @@ def _least(shown: RedundancyMap) -> Array:
 def _configurations(q: Array) -> tuple[list[float], list[float], Array]:
     """Return each joint's least coordinate and step, and the codes (n, N, M) of (N, M, n)."""
     known = q[~np.isnan(q).any(axis=2)]
+    # Of a motion that is off its path there may be none.
+    known = known if len(known) else np.zeros((1, q.shape[2]))
     low, high = known.min(axis=0), known.max(axis=0)
     step = np.maximum(high - low, np.finfo(np.float64).tiny) / _JOINT_STEPS
     places = np.round((np.where(np.isnan(q), low, q) - low) / step)
