@@ -110,6 +110,13 @@ BENCHMARKS = {
         "margins of 5 mm and 0.5° of 40 plans, displaced and judged; what they have to cost",
         Run("bought_margins.py", short="--count 1 --displacements 2"),
     ),
+    "redundancy_map": Benchmark(
+        "redundancy maps of the suite's problems against brute force, pixel by pixel",
+        Run(
+            "redundancy_map.py",
+            short="--only panda__1cube --columns 2 --rows 31 --starts 32",
+        ),
+    ),
     "place": Benchmark(
         "the best place of a part: 30 problems, against places everywhere; 10 maps, against plans",
         Run("place.py", "--many 400", short="--count 1 --many 8"),

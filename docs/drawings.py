@@ -447,6 +447,12 @@ def follow(page: "Page") -> str:
     return _svg(figure)
 
 
+def redundancy(page: "Page") -> str:
+    """Draw the redundancy map of the page."""
+    figure: Figure = page.names["shown"].figure()
+    return _svg(figure)
+
+
 def places(page: "Page") -> str:
     """Return the map of what the places of the page about them cost."""
     written = page.folder / "out" / "places" / "index.html"
@@ -468,6 +474,7 @@ _OF_PAGES: Mapping[str, Callable[["Page"], str]] = {
     "from_other_tools": from_other_tools,
     "realtime": realtime,
     "places": places,
+    "redundancy": redundancy,
 }
 
 

@@ -54,6 +54,15 @@ def test_plan_check_and_replay(tmp_path: Path) -> None:
     assert invoke("replay", plan, "--html", again)[0] == 0
     assert again.read_bytes() == html.read_bytes()
 
+    picture, arrays = tmp_path / "map.png", tmp_path / "map.npz"
+    for file in (picture, arrays):
+        code, told = invoke("replay", plan, "--html", again, "--map", file)
+        assert code == 0
+        assert f"wrote {file}" in told
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    shown = sm.result.RedundancyMap.load(arrays)
+    np.testing.assert_array_equal(shown.state, sm.load_plan(plan).redundancy_map().state)
+
 
 def test_plan_through_waypoints(tmp_path: Path) -> None:
     robot = sm.load_robot("panda")
@@ -94,6 +103,8 @@ def test_unverified_plans_exit_with_1(tmp_path: Path) -> None:
         (("plan", "panda", "--circle", "0.1", "--max-evaluations", "0"), "max_evaluations is 0"),
         (("check", "no.npz"), "error: no.npz: no such file"),
         (("replay", "no.npz"), "error: no.npz: no such file"),
+        (("replay", "no.npz", "--map", "a.svg"), "--map: a.svg is neither a .png nor a .npz file"),
+        (("replay", "a.npz", "b.npz", "--map", "a.png"), "a redundancy map is of one plan"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(arguments: tuple[str, ...], message: str) -> None:

@@ -10,7 +10,9 @@ import pytest
 
 from selfmotion.model.collision import Box, CollisionModel
 from selfmotion.model.robot import NAMED_ARMS
+from selfmotion.planning.redundancy import LEGEND
 from selfmotion.problem.constraints import Clearance
+from selfmotion.result import Reason
 from selfmotion.shell.replay import notebook_html, write_replay
 from selfmotion.shop.controllers import read_motion
 from support.layouts import chromium
@@ -609,3 +611,62 @@ def test_the_view_goes_along_with_the_tool(pages):
     assert np.abs(ended[1] - began[1]).max() > 1e-2
     page.keyboard.press("v")
     page.keyboard.press("r")
+
+
+def test_the_redundancy_map_says_what_stops_the_arm_and_lets_it_stand_there(pages):
+    page, plan = pages["panda"], arm_plan("panda")
+    shown = plan.redundancy_map()
+    # So high that the playback's buttons lie beside the map.
+    page.set_viewport_size({"width": 640, "height": 1400})
+    page.evaluate("replay.seek(0.0)")
+    box = box_of(page.locator(".map canvas"))
+    colors = np.reshape(page.evaluate(PIXELS), (*shown.state.T.shape, 4))[::-1, :, :3]
+    for reason, (_, color) in LEGEND.items():
+        drawn = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+        np.testing.assert_array_equal((colors == drawn).all(axis=2).T, shown.state == reason)
+    robot, data = plan.robot, plan.robot.model.createData()
+    limited = np.argwhere(shown.state == Reason.LIMIT)[[0, -1]].tolist()
+    for i, j in [(20, 61), *limited]:
+        x = box["x"] + box["width"] * (i + 0.5) / len(shown.times)
+        y = box["y"] + box["height"] * (1.0 - (j + 0.5) / len(shown.coordinate))
+        page.mouse.move(x, y)
+        said = page.locator(".map .said").inner_text()
+        degrees = np.degrees(shown.coordinate[j])
+        assert said.startswith(f"{shown.times[i]:.2f} s, {degrees:.1f}°: ")
+        assert said.endswith(shown.reason(i, j)) if shown.reason(i, j) else "allowed" in said
+        page.mouse.click(x, y)
+        assert time_of(page) == pytest.approx(shown.times[i], abs=1e-3)
+        poses = page_poses(page)
+        pin.forwardKinematics(robot.model, data, shown.q[i, j])
+        # Configurations travel in steps of 0.1 mrad.
+        assert (
+            max(
+                np.abs(poses[name] - data.oMi[k + 1].homogeneous).max()
+                for k, name in enumerate(robot.joint_names)
+            )
+            < 5e-4
+        )
+        assert largest_difference(poses, plan, shown.times[i]) > 1e-2
+    page.evaluate("replay.seek(1.0)")
+    assert largest_difference(page_poses(page), plan, 1.0) < 1e-4
+    page.set_viewport_size({"width": 640, "height": 480})
+    assert_quiet(page)
+
+
+PIXELS = """() => {
+  const canvas = document.querySelector(".map canvas");
+  return Array.from(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data);
+}"""
+
+
+def test_the_time_moves_along_the_redundancy_map(pages):
+    page = pages["planar"]
+    places = []
+    for time in (0.0, 1.0, 2.0):
+        page.evaluate("t => replay.seek(t)", time)
+        places.append(float(page.locator(".map .cursor").get_attribute("x1")))
+    canvas, svg = box_of(page.locator(".map canvas")), box_of(page.locator(".map svg"))
+    first = canvas["x"] - svg["x"] + 0.5 * canvas["width"] / 121
+    np.testing.assert_allclose(places, first + canvas["width"] * np.array([0, 60, 120]) / 121)
+    assert page.locator(".map .line").count() == 2
+    assert "Redundancy map: joint" in page.locator(".map figcaption").inner_text()

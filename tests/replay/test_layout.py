@@ -14,11 +14,20 @@ from support.layouts import WIDTHS, chromium, faults
 from support.replay_plans import planar_plan, two_seams
 
 # What tells, and what is worked with.
-TEXTS = ("h1", "#description", "#verdict", "#pair", "#numbers th", ".plot figcaption")
+TEXTS = (
+    "h1",
+    "#description",
+    "#verdict",
+    "#pair",
+    "#numbers th",
+    ".plot figcaption",
+    ".map figcaption",
+    ".map .said",
+)
 BOXES = (
     "#said", "#legend", "#layers", "#layers label", "#play", "#time", "#marks", "#clock", "#speed",
-    "#home", "#download", "#last", "#choice button", "#steps", ".plot svg", ".key button",
-    ".key output", "#numbers table",
+    "#home", "#download", "#last", "#choice button", "#steps", ".plot svg",
+    ".map svg", ".key button", ".key output", "#numbers table",
 )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Feeds and polylines, coordinates and their bands, limits of files, the fastest motion."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -337,6 +338,11 @@ def _constraint_rows() -> list[Row]:
     ]
 
 
+@cache
+def _sample_plan() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
 def _planning_rows() -> list[Row]:
     area = "Planning"
     limits = {"[1, 1]": [1, 1], "0": 0, "-1": -1, "nan": NAN, "'fast'": "fast"}
@@ -354,6 +360,13 @@ def _planning_rows() -> list[Row]:
             problem={"None": None, "'panda'": "panda", "Problem (the class)": sm.Problem},
             acceleration=limits,
             velocity=limits,
+        ),
+        *bad_values_of(
+            area,
+            "plan.redundancy_map",
+            lambda **g: _sample_plan().redundancy_map(**g),
+            coordinate={"'elbow'": "elbow", "'tool'": "tool", "'joint9'": "joint9", "3": 3},
+            shape={"7": 7, "(1, 9)": (1, 9), "(2.5, 9)": (2.5, 9), "(9, 10000)": (9, 10000)},
         ),
         Row(
             area,

@@ -79,6 +79,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     tool = sm.constraints.ToolLimits(speed=0.2, acceleration=5.0)
     yield "the tool", plan(replace(given, constraints=[*given.constraints, tool]))
     yield "singular poses", plan(replace(given, costs=[sm.costs.InverseManipulability(0.01)]))
+    yield "redundancy maps", lambda: sm.plan(given).redundancy_map("panda_joint7", shape=(3, 5))
     yield "paces", lambda: sm.retime(sm.plan(given))
     yield "accelerations", plan(replace(given, costs=[sm.costs.JointAcceleration()]))
     coupled = sm.costs.JointVelocity(np.eye(7) + 0.1)

@@ -1,5 +1,9 @@
 """Results: plans, reports, their files, and time scaling."""
 
+from selfmotion.planning.redundancy import (
+    Reason as Reason,
+    RedundancyMap as RedundancyMap,
+)
 from selfmotion.planning.result.archive import (
     ArmCache as ArmCache,
     files_of as files_of,
@@ -63,4 +67,6 @@ __all__ = [
     "Gap",
     "LimitsUsed",
     "NullSpaceVelocity",
+    "Reason",
+    "RedundancyMap",
 ]

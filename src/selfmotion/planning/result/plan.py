@@ -43,6 +43,8 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
+from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.redundancy import PIXELS, RedundancyMap, redundancy_map_of
 from selfmotion.planning.result.archive import Archive, in_order_of
 from selfmotion.planning.result.measured import (
     LimitsUsed,
@@ -282,6 +284,39 @@ class Plan:
             A time is outside the motion, or times have another shape.
         """
         return deviation_along(self.problem, self.trajectory, t)
+
+    def redundancy_map(
+        self, coordinate: str | None = None, *, shape: tuple[int, int] = PIXELS
+    ) -> RedundancyMap:
+        """Return what the self-motion could have chosen along the path, and what stops it there.
+
+        Time against one coordinate along the self-motion. A pixel is the configuration with that
+        value, continued from the plan's own configuration at that time; it is judged by the
+        problem's limits, constraints and bodies.
+
+        Parameters
+        ----------
+        coordinate : str, optional
+            ``"tool"``, the rotation of the tool about its axis (task ``"pointing"``); ``"elbow"``,
+            the swivel angle of an arm of seven revolute joints; or the name of a joint. By default
+            the tool's rotation where it is free; else, with one degree of redundancy, the place of
+            an external axis, the swivel angle, or the joint that the self-motion always moves;
+            with more degrees, the joint along whose self-motion the cost changes most.
+        shape : (int, int)
+            Numbers of pixels along the path, and along the coordinate.
+
+        Raises
+        ------
+        ProblemError
+            There is no such coordinate, or the shape is no shape.
+        """
+        return redundancy_map_of(
+            Formulation.of(self.problem),
+            self.trajectory,
+            self.initial_trajectory,
+            coordinate,
+            shape,
+        )
 
     def evaluate(self, cost: Cost) -> float:
         """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.

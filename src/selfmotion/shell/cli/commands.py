@@ -286,15 +286,21 @@ def replay(
         float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
     ] = None,
     gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
+    redundancy: Annotated[
+        Path | None,
+        typer.Option("--map", help="Also write a plan's redundancy map: .png, or .npz with all."),
+    ] = None,
 ) -> None:
     """Write an offline page that replays plans in a browser, several side by side.
 
-    Pictures need a browser (chromium) on this machine.
+    Pictures of the scene need a browser (chromium) on this machine.
     """
     from selfmotion.shell.replay import check_pictures, render_gif, render_png, write_replay
 
     if png is not None or gif is not None:
         check_pictures()
+    if redundancy is not None:
+        _check_map(redundancy, plans)
     if len(plans) == 1 and plans[0].suffix == jobs.PROGRAM:
         saved: Any = sm.load_program(plans[0])
         first = saved
@@ -311,8 +317,20 @@ def replay(
     if gif is not None:
         with StageDisplay(stages) as display:
             written.append(render_gif(first, gif, progress=display.stage))
+    if redundancy is not None:
+        shown = first.redundancy_map()
+        write = shown.save_png if redundancy.suffix == ".png" else shown.save
+        written.append(write(redundancy))
     for file in written:
         terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+def _check_map(file: Path, plans: list[Path]) -> None:
+    """Refuse a map of several plans or of a program, and files of other kinds."""
+    if file.suffix not in (".png", ".npz"):
+        raise sm.errors.RenderError(f"--map: {file} is neither a .png nor a .npz file")
+    if len(plans) != 1 or plans[0].suffix == jobs.PROGRAM:
+        raise sm.errors.RenderError("--map: a redundancy map is of one plan")
 
 
 # The commands that change how fast motions are.

@@ -21,6 +21,7 @@ from selfmotion.shell.replay.motion import (
     self_motion,
     torque_limits,
 )
+from selfmotion.shell.replay.redundancy import map_of, packed_map, tree
 from selfmotion.shell.replay.whole import Whole, describe, table
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
@@ -121,6 +122,7 @@ def page_content(
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
+        "tree": tree(robot, payload),
         # What is drawn moves with the model's joints: those that mimic others are among them.
         "movers": [links.joint_name(robot, k) for k in range(robot.model.nv)],
         "layers": _layers(motions),
@@ -203,6 +205,7 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
+        "redundancy": None if whole else packed_map(map_of(motion.plan), payload),
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {

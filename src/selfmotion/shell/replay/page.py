@@ -37,7 +37,7 @@ from selfmotion.work.job import Program
 Shown = Plan | Sequence[Plan] | Program | Parts | Move
 _TRIADS, _MOST_TRIADS = 7, 1000
 _VIEWER = "meshcat/viewer/dist/main.min.js"
-_SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
+_SCRIPTS = ("payload.js", "stage.js", "plots.js", "map.js", "page.js")
 
 
 def replay_html(

@@ -57,6 +57,7 @@ class Page {
     }
     for (const [stage, k] of this.sides) this.loadTo(stage, k);
     get("aside").value = this.aside = 0;
+    this.standing = null;
     const { selfMotion } = this.plan;
     get("selfmotion").hidden = !this.stage || !selfMotion;
     if (selfMotion) {
@@ -76,6 +77,7 @@ class Page {
   seek(time) {
     this.now = Math.min(Math.max(time, 0), this.duration);
     get("aside").value = this.aside = 0;
+    this.standing = null;
     // A shorter plan waits at its end for a longer one beside it.
     for (const [stage, k] of this.sides) stage.seek(Math.min(this.now, this.content.plans[k].duration));
     this.follow(this.now);
@@ -112,6 +114,7 @@ class Page {
   showOn(stage, plan, time) {
     if (this.layers.ellipsoid) stage.stretch(plan.ellipsoid, time, this.content.ellipsoidSize);
     if (this.aside && plan.selfMotion) stage.place(plan, time, this.aside + (plan.selfMotion.steps - 1) / 2);
+    if (this.standing && plan === this.plan) stage.stand(plan, this.standing);
     stage.accompany(get("follow").checked ? stage.toolAt(plan.ellipsoid, time) : undefined);
     stage.label(this.layers.names ? { ...this.content.links, ...plan.obstacles } : {});
   }
@@ -119,6 +122,8 @@ class Page {
   // The closest pair at the sample nearest in time: by name, and tinted in the scene.
   showPair(time) {
     const { clearance } = this.plan;
+    // Where it stands aside the map says what stops it.
+    if (this.standing) return;
     const shown = clearance !== null && this.layers.pair && !this.aside;
     get("pair").hidden = !shown;
     if (!shown) {
@@ -212,6 +217,7 @@ class Page {
   turn(step) {
     if (this.playing) this.pause();
     this.aside = step;
+    this.standing = null;
     // Of these postures nobody has measured it.
     get("pair").hidden = true;
     this.stage?.mark([], {});
@@ -220,6 +226,16 @@ class Page {
       if (selfMotion) stage.place(this.content.plans[k], this.now, step + (selfMotion.steps - 1) / 2);
       stage.label(this.layers.names ? { ...this.content.links, ...this.content.plans[k].obstacles } : {});
     }
+  }
+
+  // Stand in a configuration that the map has, with the bodies marked that meet there.
+  stand(q, cause) {
+    this.standing = q;
+    // In the place of the closest pair: the map stays where it is under the pointer.
+    get("pair").textContent = `shown from the map: ${cause || "allowed"}`;
+    get("pair").classList.toggle("meet", cause !== "");
+    this.stage?.mark(cause.split(" "), this.plan.obstacles, true);
+    for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], this.now);
   }
 
   // Two plans side by side, on one clock and seen from one place.
@@ -349,8 +365,10 @@ class Page {
 
   makePlots() {
     for (const plot of this.plots) plot.remove();
-    this.plots = plotSpecs(this.content, this.plan).map((spec, id) => new Plot(
-      get("plots"), { ...spec, id, events: this.plan.events }, (time) => { this.pause(); this.seek(time); }));
+    const seek = (time) => { this.pause(); this.seek(time); };
+    const { redundancy, events } = this.plan;
+    const map = redundancy ? [new RedundancyMap(get("plots"), redundancy, seek, (q, cause) => this.stand(q, cause))] : [];
+    this.plots = [...map, ...plotSpecs(this.content, this.plan).map((spec, id) => new Plot(get("plots"), { ...spec, id, events }, seek))];
   }
 
   // What a program consists of: a button for each step, which leads to its begin.
@@ -430,41 +448,6 @@ class Page {
 function unit(vector) {
   const length = Math.hypot(...vector);
   return vector.map((value) => value / length);
-}
-
-// Column k of a table stored row by row.
-function column(table, k, width) {
-  return Float32Array.from({ length: table.length / width }, (_, row) => table[row * width + k]);
-}
-
-function plotSpecs({ joints }, { curves, start, clearance, steps }) {
-  const unit = [...new Set(joints.map((joint) => joint.unit))].join(" or ");
-  const perJoint = (table, low, high) => joints.map((joint, k) => ({
-    name: joint.name, values: column(table, k, joints.length), color: COLORS[k % COLORS.length],
-    low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
-  const both = (name) => [
-    { name: "plan", values: curves[name], color: COLORS[0] },
-    ...(steps.length ? [] : [{ name: "minimum-norm", values: start[name], color: COLORS[1], start: true }])];
-  const errors = [
-    ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
-    ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
-  const { t } = curves;
-  const note = "dashed: limits";
-  const within = (title, unit, table, limit) => ({ title, unit, t, note,
-    curves: perJoint(table, (j) => (j[limit] === null ? null : -j[limit]), (j) => j[limit]) });
-  const per = (power) => unit.replaceAll(/rad|m/g, `$&/s${power}`);
-  return [
-    { title: "Joint positions q", unit, t, note, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
-    within("Joint velocities q̇", per(""), curves.qd, "speed"),
-    within("Joint accelerations q̈", per("²"), curves.qdd, "acceleration"),
-    ...("torque" in curves ? [within("Joint torques", unit.replaceAll(/rad|m/g, (u) => (u === "m" ? "N" : "Nm")), curves.torque, "effort")] : []),
-    { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
-    // Of several steps each has a path of its own, or none.
-    ...(steps.length ? [] : [{ title: curves.relaxed ? "Off the path" : "Path error", unit: "", t, log: true,
-      floor: 1e-16, note: curves.relaxed ? "relaxed rows included" : "", curves: errors }]),
-    ...(clearance ? [{ title: "Clearance", unit: "m", t: clearance.t, zero: true,
-      curves: [{ name: "closest pair", values: clearance.value, color: COLORS[0] }] }] : []),
-  ];
 }
 
 async function start() {

@@ -195,3 +195,38 @@ class Plot {
     line.setAttribute("x2", x);
   }
 }
+
+// Column k of a table stored row by row.
+function column(table, k, width) {
+  return Float32Array.from({ length: table.length / width }, (_, row) => table[row * width + k]);
+}
+
+function plotSpecs({ joints }, { curves, start, clearance, steps }) {
+  const unit = [...new Set(joints.map((joint) => joint.unit))].join(" or ");
+  const perJoint = (table, low, high) => joints.map((joint, k) => ({
+    name: joint.name, values: column(table, k, joints.length), color: COLORS[k % COLORS.length],
+    low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
+  const both = (name) => [
+    { name: "plan", values: curves[name], color: COLORS[0] },
+    ...(steps.length ? [] : [{ name: "minimum-norm", values: start[name], color: COLORS[1], start: true }])];
+  const errors = [
+    ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
+    ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
+  const { t } = curves;
+  const note = "dashed: limits";
+  const within = (title, unit, table, limit) => ({ title, unit, t, note,
+    curves: perJoint(table, (j) => (j[limit] === null ? null : -j[limit]), (j) => j[limit]) });
+  const per = (power) => unit.replaceAll(/rad|m/g, `$&/s${power}`);
+  return [
+    { title: "Joint positions q", unit, t, note, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
+    within("Joint velocities q̇", per(""), curves.qd, "speed"),
+    within("Joint accelerations q̈", per("²"), curves.qdd, "acceleration"),
+    ...("torque" in curves ? [within("Joint torques", unit.replaceAll(/rad|m/g, (u) => (u === "m" ? "N" : "Nm")), curves.torque, "effort")] : []),
+    { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
+    // Of several steps each has a path of its own, or none.
+    ...(steps.length ? [] : [{ title: curves.relaxed ? "Off the path" : "Path error", unit: "", t, log: true,
+      floor: 1e-16, note: curves.relaxed ? "relaxed rows included" : "", curves: errors }]),
+    ...(clearance ? [{ title: "Clearance", unit: "m", t: clearance.t, zero: true,
+      curves: [{ name: "closest pair", values: clearance.value, color: COLORS[0] }] }] : []),
+  ];
+}

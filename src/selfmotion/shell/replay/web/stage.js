@@ -181,13 +181,39 @@ class Stage {
         turn.addScaledVector(one, one.dot(turn) < 0 ? -weight : weight);
       }
       turn.normalize();
-      const moved = [`${ROOT}/robot/${node}`, `${ROOT}/bodies/${node}`,
-        ...plan.riders.filter(({ carrier }) => carrier === joint).map(({ root }) => root)];
-      for (const object of moved.map((path) => this.find(path))) {
-        if (!this.kept.has(object)) this.kept.set(object, [object.position.clone(), object.quaternion.clone()]);
-        object.position.copy(place);
-        object.quaternion.set(turn.x, turn.y, turn.z, turn.w);
-      }
+      this.put(plan, node, joint, place, turn);
+    });
+    this.viewer.set_dirty();
+  }
+
+  // Put what moves with a joint somewhere else than the animation has it.
+  put(plan, node, joint, place, turn) {
+    const moved = [`${ROOT}/robot/${node}`, `${ROOT}/bodies/${node}`,
+      ...plan.riders.filter(({ carrier }) => carrier === joint).map(({ root }) => root)];
+    for (const object of moved.map((path) => this.find(path))) {
+      if (!this.kept.has(object)) this.kept.set(object, [object.position.clone(), object.quaternion.clone()]);
+      object.position.copy(place);
+      object.quaternion.set(turn.x, turn.y, turn.z, turn.w);
+    }
+  }
+
+  // Put the links where a configuration has them: each joint is placed in the one before.
+  stand(plan, q) {
+    const { THREE } = MeshCat;
+    const { coordinates, parents, rotations, positions, axes, revolute, scales } = this.content.tree;
+    const frames = [new THREE.Matrix4()];
+    this.content.movers.forEach((node, joint) => {
+      const [a, b, c, d, e, f, g, h, i] = rotations.subarray(9 * joint, 9 * joint + 9);
+      const [x, y, z] = positions.subarray(3 * joint, 3 * joint + 3);
+      const own = new THREE.Matrix4().set(a, b, c, x, d, e, f, y, g, h, i, z, 0, 0, 0, 1);
+      const axis = new THREE.Vector3().fromArray(axes, 3 * joint);
+      const by = q[coordinates[joint]] * scales[joint];
+      const moved = revolute[joint] ? new THREE.Matrix4().makeRotationAxis(axis, by)
+        : new THREE.Matrix4().setPosition(axis.multiplyScalar(by));
+      frames.push(frames[parents[joint]].clone().multiply(own).multiply(moved));
+      const place = new THREE.Vector3().setFromMatrixPosition(frames[joint + 1]);
+      const turn = new THREE.Quaternion().setFromRotationMatrix(frames[joint + 1]);
+      this.put(plan, node, joint, place, turn);
     });
     this.viewer.set_dirty();
   }
