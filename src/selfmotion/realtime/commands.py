@@ -19,24 +19,31 @@ from selfmotion.problem.constraints import (
     JointAccelerationLimits,
     JointPositionLimits,
     JointVelocityLimits,
+    PositionDependentVelocityLimits,
 )
 from selfmotion.realtime import law
 from selfmotion.realtime.law import braking_distance, tightened
 from selfmotion.realtime.settings import ACCELERATION, ENDS, FARTHEST, GAIN, SPEED
 
-_USUAL = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits)
+_USUAL = (
+    JointPositionLimits,
+    JointVelocityLimits,
+    JointAccelerationLimits,
+    PositionDependentVelocityLimits,
+)
 
 
 def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
-    """Return lower, upper, speed and acceleration limits of an arm, (4, n).
+    """Return limits of an arm, (8, n): see `law.DEVIATION`.
 
-    Those of the arm and its maker, and of the constraints.
+    Lower, upper, speed and acceleration, and curves of speed by position: those of the arm and its
+    maker, and of the constraints.
 
     Raises
     ------
     ProblemError
         A constraint is of a kind that cannot be kept while moving; a joint has no limit of
-        acceleration.
+        acceleration; several constraints say how its speed depends on the position.
     """
     for item in constraints:
         if not item.kept_moving:
@@ -56,14 +63,27 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
             f"acceleration, which a stop in time needs; give JointVelocityLimits(…) and "
             f"JointAccelerationLimits(…)"
         )
-    return limits
+    several = [item for item in envelope.curves if item.limited.any()]
+    if len(several) > 1:
+        raise ProblemError(
+            f"{robot.name}: {len(several)} constraints say how limits of speed depend on the "
+            f"position, expected one PositionDependentVelocityLimits"
+        )
+    n = robot.dof
+    ends = np.full(n, np.inf)
+    curves = np.stack([np.ones(n), np.zeros(n), -ends, ends])
+    for one in several:
+        curves = np.stack([one.deceleration, one.offset, one.lower, one.upper])
+    return np.vstack([limits, curves])
 
 
 def planned_limits(limits: Array) -> Array:
-    """Return the limits of plans, within the limits (4, n) of commands."""
-    lower, upper = limits[:2]
+    """Return the limits of plans, within the limits (8, n) of commands."""
+    lower, upper, speed, hardest, hard, offset, first, last = limits
     margin = np.minimum(ENDS, 0.1 * (upper - lower))
-    return np.stack([lower + margin, upper - margin, SPEED * limits[2], ACCELERATION * limits[3]])
+    ends = lower + margin, upper - margin
+    curve = hard, offset, first + margin, last - margin
+    return np.stack([*ends, SPEED * speed, ACCELERATION * hardest, *curve])
 
 
 def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
@@ -72,15 +92,23 @@ def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: floa
     Raises
     ------
     StartError
-        A joint cannot stop within the limits (4, n) from there.
+        A joint cannot stop within the limits (8, n) from there.
     """
     c = q + cycle * qd
     lower, upper, speed, hardest = limits[:4]
-    room = np.where(qd > 0.0, upper - c, c - lower)
+    ahead = np.where(qd > 0.0, upper - c, c - lower)
     need = np.array(
         [braking_distance(abs(w), most, cycle) for w, most in zip(qd, hardest, strict=True)]
     )
-    bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
+    curve = np.where(qd > 0.0, limits[law.CURVE_UPPER] - q, q - limits[law.CURVE_LOWER])
+    most = np.array(
+        [
+            law.fastest_on_curve(float(room), float(a), float(hard), float(offset), cycle)
+            for room, a, hard, offset in zip(curve, *limits[3:6], strict=True)
+        ]
+    )
+    beyond = (np.abs(qd) > speed) | (need > ahead) | ((qd != 0.0) & (np.abs(qd) > most))
+    bad = np.flatnonzero((c < lower) | (c > upper) | beyond)
     if bad.size:
         k = int(bad[0])
         name = robot.joint_names[k]
@@ -89,7 +117,8 @@ def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: floa
         asks = is_outside and unit == "rad" and abs(q[k]) > 2.0 * np.pi
         raise StartError(
             f"joint '{name}' is at {q[k]:.6g} {unit}, {qd[k]:.6g} {unit}/s, from where it cannot "
-            f"stop within {lower[k]:.6g}..{upper[k]:.6g} {unit} at up to {speed[k]:.6g} {unit}/s; "
+            f"stop within {lower[k]:.6g}..{upper[k]:.6g} {unit} at up to "
+            f"{min(speed[k], max(most[k], 0.0)):.6g} {unit}/s; "
             f"bring the arm within its limits first"
             f"{'; are its angles in degrees? expected rad' if asks else ''}",
             position_miss=0.0,
@@ -171,8 +200,8 @@ class Commands:
     Parameters
     ----------
     robot : RobotModel
-    limits : (4, n)
-        Lower, upper, speed, acceleration.
+    limits : (8, n)
+        Lower, upper, speed, acceleration, and the curves: see `law.DEVIATION`.
     cycle : float
         Time between commands [s].
     cycles : int
@@ -213,7 +242,7 @@ class Commands:
         self._states[:] = 0.0
         self._states[:, 0], self._states[0, 1] = c, qd
         law.brake(self._states, 0, self._limits, self._cycle)
-        self.time, self._limits[4], self._sent[:] = t, 0.0, q
+        self.time, self._limits[law.DEVIATION], self._sent[:] = t, 0.0, q
 
     def go_on(self, t: float) -> float:
         """Make the state that is commanded at `t` the first one; return the time passed [s]."""
@@ -233,7 +262,7 @@ class Commands:
     @property
     def deviation(self) -> Array:
         """Filtered deviation of the arm from its command, (n,) [rad or m]."""
-        return np.asarray(self._limits[4])
+        return np.asarray(self._limits[law.DEVIATION])
 
     @property
     def rate(self) -> Array:
@@ -252,7 +281,7 @@ class Commands:
         if abs(off[worst]) > FARTHEST:
             return f"joint '{self._robot.joint_names[worst]}' is {off[worst]:.3g} from its command"
         share = 1.0 - np.exp(-passed / self._settling)
-        self._limits[4] += share * (off - self._limits[4])
+        self._limits[law.DEVIATION] += share * (off - self._limits[law.DEVIATION])
         return ""
 
     def follow(self, kinematics: Kinematics, layout: Layout, table: Array) -> bool:
@@ -261,7 +290,7 @@ class Commands:
         Returns whether the tool moves as planned.
         """
         states, limits, h, n = self._states, self._limits, self._cycle, self._robot.dof
-        table[0, :n] = states[0, 0] + 0.5 * h * states[0, 1] + limits[4]
+        table[0, :n] = states[0, 0] + 0.5 * h * states[0, 1] + limits[law.DEVIATION]
         follows = True
 
         def step(

@@ -56,8 +56,9 @@ class Replanner:
     costs : sequence of Cost
         By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
-        `JointPositionLimits`, `JointVelocityLimits` and `JointAccelerationLimits`, by default those
-        of the arm and its maker, and `Clearance`, whose obstacles may move.
+        `JointPositionLimits`, `JointVelocityLimits`, `JointAccelerationLimits` and
+        `PositionDependentVelocityLimits`, by default those of the arm and its maker, and
+        `Clearance`, whose obstacles may move.
     horizon : float
         How far ahead is planned [s].
     null_motion : NullMotion
@@ -118,7 +119,8 @@ class Replanner:
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = checked_terms(follows, costs, constraints)
-        self.limits = limits = joint_limits(robot, constraints)
+        limits = joint_limits(robot, constraints)
+        self.limits = limits[:4]
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]

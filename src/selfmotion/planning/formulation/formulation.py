@@ -322,6 +322,7 @@ class Formulation:
             jerk,
             own.bodies,
             (*(of_arm(item, n) for item in own.quantities), *several),
+            tuple(item.extended(virtual.dof - n) for item in own.curves),
         )
 
     def null_functions(self, t: Array, motion: NullMotion) -> Array:
