@@ -16,45 +16,68 @@ from selfmotion.basics.layout import Layout
 from selfmotion.model.robot import Kinematics, RobotModel
 from selfmotion.problem.constraints import (
     Constraint,
+    Envelope,
     JointAccelerationLimits,
+    JointJerkLimits,
     JointPositionLimits,
     JointVelocityLimits,
     PositionDependentVelocityLimits,
 )
 from selfmotion.realtime import law
 from selfmotion.realtime.law import braking_distance, tightened
-from selfmotion.realtime.settings import ACCELERATION, ENDS, FARTHEST, GAIN, SPEED
+from selfmotion.realtime.settings import (
+    ACCELERATION,
+    ENDS,
+    FARTHEST,
+    GAIN,
+    LONGEST_MEAN,
+    SPEED,
+)
 
+# Excess of a number of cycles that counts as rounding, relative to it.
+_ROUNDING = 1e-9
 _USUAL = (
     JointPositionLimits,
     JointVelocityLimits,
     JointAccelerationLimits,
+    JointJerkLimits,
     PositionDependentVelocityLimits,
 )
 
 
-def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
-    """Return limits of an arm, (8, n): see `law.DEVIATION`.
+def kept_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+    """Return what the loop keeps of configurations and velocities.
 
-    Lower, upper, speed and acceleration, and curves of speed by position: those of the arm and its
-    maker, and of the constraints.
+    The limits of the arm and its maker, and of the constraints.
 
     Raises
     ------
     ProblemError
-        A constraint is of a kind that cannot be kept while moving; a joint has no limit of
-        acceleration; several constraints say how its speed depends on the position.
+        A constraint is of a kind that cannot be kept while moving.
     """
     for item in constraints:
         if not item.kept_moving:
             raise ProblemError(
                 f"constraint {type(item).__name__} is not kept while moving, expected limits of "
-                f"joint position, velocity and acceleration, or a Clearance"
+                f"joint position, velocity, acceleration and jerk, or a Clearance"
             )
     kinds = {type(item) for item in constraints}
     # Without given ones, those of the arm and its maker.
     asked = [*constraints, *(kind() for kind in _USUAL if kind not in kinds)]
-    envelope = reduce(and_, (item.envelope(robot) for item in asked))
+    return reduce(and_, (item.envelope(robot) for item in asked))
+
+
+def joint_limits(robot: RobotModel, envelope: Envelope) -> Array:
+    """Return limits of an arm, (8, n): see `law.DEVIATION`.
+
+    Lower, upper, speed and acceleration, and curves of speed by position.
+
+    Raises
+    ------
+    ProblemError
+        A joint has no limit of acceleration; several constraints say how its speed depends on the
+        position.
+    """
     limits = np.array([envelope.lower, envelope.upper, envelope.speed, envelope.acceleration])
     endless = np.flatnonzero(~np.isfinite(limits[2:]).all(axis=0))
     if endless.size:
@@ -75,6 +98,31 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
     for one in several:
         curves = np.stack([one.deceleration, one.offset, one.lower, one.upper])
     return np.vstack([limits, curves])
+
+
+def cycles_of_mean(robot: RobotModel, envelope: Envelope, cycle: float) -> int:
+    """Return the number M of cycles over which commands are averaged, so that jerks keep limits.
+
+    Accelerations of a mean over M cycles change by 2A/(M h) per time at most: M ≥ 2A/(J h).
+
+    Raises
+    ------
+    ProblemError
+        A mean over so many cycles would no longer be the motion that was planned.
+    """
+    needed = np.ceil(2.0 * envelope.acceleration / (envelope.jerk * cycle) * (1.0 - _ROUNDING))
+    worst = int(np.argmax(needed))
+    if needed[worst] * cycle > LONGEST_MEAN:
+        unit = robot.unit_of(robot.joint_names[worst])
+        most = 0.5 * envelope.jerk[worst] * LONGEST_MEAN
+        raise ProblemError(
+            f"{robot.name}: joint '{robot.joint_names[worst]}': a jerk of "
+            f"{envelope.jerk[worst]:.4g} {unit}/s³ is not kept while moving beside an acceleration "
+            f"of {envelope.acceleration[worst]:.4g} {unit}/s², expected JointAccelerationLimits of "
+            f"{most:.4g} {unit}/s² or less, or JointJerkLimits of "
+            f"{2.0 * envelope.acceleration[worst] / LONGEST_MEAN:.4g} {unit}/s³ or more"
+        )
+    return max(int(needed[worst]), 1)
 
 
 def planned_limits(limits: Array) -> Array:
@@ -197,6 +245,11 @@ class Segment:
 class Commands:
     """Commands of a segment, and the deviation of the arm from them.
 
+    What is commanded is the mean of the motion of `law` over the last M cycles. Limits of q, q̇ and
+    q̈ that a motion keeps are kept by its means, as are limits of q̇ that depend on q by a convex
+    function; and the acceleration of the mean changes by no more than 2A/(M h) per time. The motion
+    of `law` is ahead of the command by half of that, `lead`.
+
     Parameters
     ----------
     robot : RobotModel
@@ -210,11 +263,15 @@ class Commands:
         How old a measured position is [s].
     settling : float
         Time constant [s] of the filter of the arm's deviation from its command.
+    mean : int
+        Number M of cycles of the mean.
 
     Attributes
     ----------
     time : float
         When the first state is commanded [s].
+    lead : float
+        By how much the motion of `law` is ahead of the command [s].
     """
 
     def __init__(
@@ -225,6 +282,7 @@ class Commands:
         cycles: int,
         latency: float,
         settling: float,
+        mean: int = 1,
     ) -> None:
         self._robot, self._cycle, self._settling = robot, cycle, settling
         # The last row is the arm's deviation from its command.
@@ -232,14 +290,20 @@ class Commands:
         # Number of cycles in which every joint stops from its highest speed.
         stopping = int(np.ceil((limits[2] / (limits[3] * cycle)).max())) + 3
         # c, w and a of each cycle; see `viable`.
-        self._states = np.zeros((cycles + stopping + 1, 3, robot.dof))
+        self._states = np.zeros((cycles + stopping + mean, 3, robot.dof))
+        # Those of the M - 1 cycles before.
+        self._past = np.zeros((mean - 1, 3, robot.dof))
+        self.lead = 0.5 * (mean - 1) * cycle
         self._sent = np.zeros((round(latency / cycle) + 1, robot.dof))
         self.time = 0.0
 
     def begin(self, t: float, q: Array, qd: Array) -> None:
         """Command the arm to stop from its first state."""
-        c = stoppable(self._robot, self._limits, q, qd, self._cycle)
+        c = stoppable(self._robot, self._limits, q + self.lead * qd, qd, self._cycle)
         self._states[:] = 0.0
+        # It came at the same rate.
+        since = self._cycle * np.arange(len(self._past), 0, -1)[:, None]
+        self._past[:, 0], self._past[:, 1], self._past[:, 2] = c - since * qd, qd, 0.0
         self._states[:, 0], self._states[0, 1] = c, qd
         law.brake(self._states, 0, self._limits, self._cycle)
         self.time, self._limits[law.DEVIATION], self._sent[:] = t, 0.0, q
@@ -251,10 +315,14 @@ class Commands:
             raise ProblemError(f"t is {t} s, expected no less than the last step's {self.time} s")
         end = len(self._states) - 1
         here = min(passed, end)
-        sent = self._positions(self._states[: here + 1])
+        sent = self._commanded(here)[:, 0]
         if passed > end:
             sent = np.vstack([sent, np.repeat(sent[-1:], min(passed - end, len(self._sent)), 0)])
         self._sent = np.vstack([self._sent, sent[1:]])[-len(self._sent) :]
+        past = np.vstack([self._past, self._states[:here]])[len(self._states[:here]) :]
+        # Where it has come to rest, it rested before.
+        beyond = min(passed - here, len(past))
+        self._past[:] = np.vstack([past[beyond:], np.repeat(self._states[here][None], beyond, 0)])
         self._states[0] = self._states[here]
         self.time += passed * self._cycle
         return passed * self._cycle
@@ -313,18 +381,30 @@ class Commands:
         end = law.brake(self._states, first, self._limits, h)
         # After the end the arm rests.
         self._states[end + 1 :] = self._states[end]
-        end = max(end, 1)
-        states = self._states[: end + 1]
+        end = max(end + len(self._past), 1)
+        q, qd, qdd = np.moveaxis(self._commanded(end), 1, 0)
         return Segment(
             t=np.asarray(self.time + h * np.arange(end + 1), dtype=np.float64),
-            q=self._positions(states),
-            qd=states[:, 1] - 0.5 * h * states[:, 2],
-            qdd=states[:, 2],
+            q=q,
+            qd=qd,
+            qdd=qdd,
             flag=flag,
             reasons=reasons,
             follows=follows,
             tool_error=error,
         )
+
+    def _commanded(self, end: int) -> Array:
+        """Return q, q̇ and q̈ of the commands up to cycle `end`, (end + 1, 3, n)."""
+        states, h = np.concatenate([self._past, self._states[: end + 1]]), self._cycle
+        motion = np.stack(
+            [self._positions(states), states[:, 1] - 0.5 * h * states[:, 2], states[:, 2]], axis=1
+        )
+        mean = len(self._past) + 1
+        # Relative to the newest of each, so that an arm at rest is exactly at rest.
+        newest = motion[mean - 1 :]
+        total = sum(motion[k : k + end + 1] - newest for k in range(mean - 1))
+        return np.asarray(newest + total / mean)
 
     def _positions(self, states: Array) -> Array:
         """Return q of states: the spline at its knots, (c⁻ + 4 c + c⁺)/6."""

@@ -31,7 +31,15 @@ from selfmotion.realtime.checks import (
     observed_target,
 )
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.commands import Commands, Flag, Segment, joint_limits, planned_limits
+from selfmotion.realtime.commands import (
+    Commands,
+    Flag,
+    Segment,
+    cycles_of_mean,
+    joint_limits,
+    kept_envelope,
+    planned_limits,
+)
 from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.reference import Approach, LastPath, Reference
 from selfmotion.realtime.settings import AHEAD, SOON
@@ -45,8 +53,8 @@ class Replanner:
     velocity and acceleration. The measured deviation of the arm from its command is filtered, and
     the tool is planned for the arm's pose, so that the command compensates for it.
 
-    Limits of position, velocity and acceleration hold for every command, at all times and in all
-    events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
+    Limits of position, velocity, acceleration and jerk hold for every command, at all times and in
+    all events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
 
     Parameters
     ----------
@@ -56,8 +64,8 @@ class Replanner:
     costs : sequence of Cost
         By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
-        `JointPositionLimits`, `JointVelocityLimits`, `JointAccelerationLimits` and
-        `PositionDependentVelocityLimits`, by default those of the arm and its maker, and
+        `JointPositionLimits`, `JointVelocityLimits`, `JointAccelerationLimits`, `JointJerkLimits`
+        and `PositionDependentVelocityLimits`, by default those of the arm and its maker, and
         `Clearance`, whose obstacles may move.
     horizon : float
         How far ahead is planned [s].
@@ -119,18 +127,19 @@ class Replanner:
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = checked_terms(follows, costs, constraints)
-        limits = joint_limits(robot, constraints)
-        self.limits = limits[:4]
+        envelope = kept_envelope(robot, constraints)
+        limits = joint_limits(robot, envelope)
+        self.limits, self.jerk_limit = limits[:4], envelope.jerk
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
-        bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
-        self._around = Surroundings(robot, bodies) if bodies else None
+        self._around = Surroundings(robot, envelope.bodies) if envelope.bodies else None
         self._horizon = Horizon(
             follows, costs, planned_limits(limits), null_motion, self.horizon, steps, self._around
         )
         self._kinematics, self._layout = follows.only.chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
-        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
+        mean = cycles_of_mean(robot, envelope, self.cycle)
+        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling, mean)
         self._prepare()
         self._reference = Reference(follows, approach or Approach(), self._times)
         self._started = False
@@ -242,7 +251,8 @@ class Replanner:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
         waited = max(passed, self.cycle)
-        target = self._path.samples(path, commands.time + self._times, waited, age, reasons)
+        ahead = commands.time + commands.lead + self._times
+        target = self._path.samples(path, ahead, waited, age, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:

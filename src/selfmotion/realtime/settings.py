@@ -17,6 +17,10 @@ FOLLOWED = 1e-3
 # Sampling interval of an offset of the tool [s].
 OFFSET_STEP = 2e-3
 
+# Longest time over which commands are averaged for limits of the jerk [s]: the tool leaves its path
+# by a 24th of its square times the acceleration, 0.2 mm at 10 m/s².
+LONGEST_MEAN = 0.02
+
 # --- when it stops
 # Motions that break down within this time [s] are not followed: the arm stops in less.
 SOON = 0.5
