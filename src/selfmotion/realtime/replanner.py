@@ -27,9 +27,11 @@ from selfmotion.realtime.checks import (
     check_null_space,
     checked_state,
     checked_terms,
+    known_chunk,
     measured_state,
     observed_target,
 )
+from selfmotion.realtime.chunks import Chunk, joined
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import (
     Commands,
@@ -141,7 +143,8 @@ class Replanner:
         mean = cycles_of_mean(robot, envelope, self.cycle)
         self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling, mean)
         self._prepare()
-        self._reference = Reference(follows, approach or Approach(), self._times)
+        self._approach = approach or Approach()
+        self._reference = Reference(follows, self._approach, self._times)
         self._started = False
 
     def _prepare(self) -> None:
@@ -175,12 +178,15 @@ class Replanner:
         target: SE3 | npt.ArrayLike | None = None,
         twist: npt.ArrayLike | None = None,
         seen: float | None = None,
+        chunk: Sequence[SE3] | npt.ArrayLike | None = None,
+        times: npt.ArrayLike | None = None,
     ) -> Segment:
         """Return the motion to command from `t` on.
 
-        The task is a `path`, or a `target` as a camera sees it. A target may have its own rate:
-        without either, the last one continues, within the replanner's `patience`; then the arm is
-        brought to rest.
+        The task is a `path`, a `target` as a camera sees it, or a `chunk` of poses for the next
+        seconds, as a learned policy gives them. Targets and chunks may have their own rate: without
+        any, the last one continues: a target within the replanner's `patience`, a chunk up to its
+        last pose; then the arm is brought to rest.
 
         Parameters
         ----------
@@ -204,6 +210,13 @@ class Replanner:
         seen : float, optional
             When the target was seen, on the clock of `t` [s]; by default at `t`. One that was seen
             longer ago than `patience` is none, however often it is sent.
+        chunk : sequence of SE3, or (K, 4, 4), optional
+            Where the tool is to be at `times` [m], world axes. What was followed before holds until
+            the first of these, or `t`, and is then left for the chunk without a jump in
+            acceleration. One that is over, or has a number that is none, is left out, and
+            `Segment.reasons` says why; `Chunk.of` raises the same as an error.
+        times : (K,), optional
+            Of the chunk, on the clock of `t` [s], increasing.
 
         Returns
         -------
@@ -215,12 +228,15 @@ class Replanner:
         StartError
             The first state is not one from which the arm can stop within its limits.
         ProblemError
-            `t` lies before the last step, an obstacle is not known, or there are both a path and a
-            target.
+            `t` lies before the last step, an obstacle is not known, there are two of path, target
+            and chunk, or a chunk without times.
         """
         t, reasons = as_number(t, "t"), list[str]()
         if target is not None or twist is not None or seen is not None:
             path = observed_target(path, target, twist, t if seen is None else seen, reasons)
+        poses = None
+        if chunk is not None or times is not None:
+            poses = known_chunk(path, target, times, chunk, t, reasons)
         age = age_of_target(path, t)
         if abs(age) > self._patience:
             when = f"{age:.3g} s ago" if age > 0.0 else f"in {-age:.3g} s: on another clock?"
@@ -229,7 +245,7 @@ class Replanner:
             )
             path, age = None, 0.0
         with one_blas_thread():
-            return self._step(t, q, qd, path, max(age, 0.0), obstacles or {}, reasons)
+            return self._step(t, q, qd, poses or path, max(age, 0.0), obstacles or {}, reasons)
 
     def _step(
         self,
@@ -244,6 +260,8 @@ class Replanner:
         dof = self.robot.dof
         if not self._started:
             self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
+        if isinstance(path, Chunk):
+            path = joined(self._path.path, path, t, self._approach)
         q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)

@@ -21,6 +21,18 @@ OFFSET_STEP = 2e-3
 # by a 24th of its square times the acceleration, 0.2 mm at 10 m/s².
 LONGEST_MEAN = 0.02
 
+# --- chunks
+# Time in which the tool comes from rest before the first pose, and to rest after the last one [s].
+CHUNK_END = 0.2
+# Step of differences of twists, for accelerations at the ends of chunks [s].
+DIFFERENCE = 1e-4
+# Shortest time in which a chunk is joined [s] …
+JOIN_SHORTEST = 0.05
+# … factor to the next one that is tried …
+JOIN_FACTOR = 1.25
+# … and the longest [s].
+JOIN_LONGEST = 2.0
+
 # --- when it stops
 # Motions that break down within this time [s] are not followed: the arm stops in less.
 SOON = 0.5
