@@ -251,3 +251,41 @@ def test_a_first_state_in_degrees_is_asked_about(
         with pytest.raises(sm.errors.StartError, match=rad) as caught:
             Replanner(panda).step(0.0, q, np.zeros(7), slow_circle)
         assert ("in degrees?" in str(caught.value)) is asked
+
+
+def test_a_quantity_that_claims_to_be_kept_is_refused(panda: sm.RobotModel) -> None:
+    """Else it would be left out in silence."""
+
+    class Claimed(sm.constraints.Band):
+        kept_moving = True
+
+    band = Claimed(sm.robot.JointCoordinate("panda_joint2"), 0.0, 1.0)
+    with pytest.raises(sm.errors.ProblemError, match="Claimed says that it is kept while moving"):
+        Replanner(panda, constraints=[band])
+
+
+@pytest.mark.parametrize("name", sm.constraints.__all__)
+def test_each_constraint_is_kept_or_refused_by_name(panda: sm.RobotModel, name: str) -> None:
+    """None is left out in silence: of all that a problem may have."""
+    wall = sm.obstacles.Sphere("wall", np.array([0.0, 0.0, 9.0]), 0.1)
+    asked = {
+        "Band": lambda kind: kind(sm.robot.JointCoordinate("panda_joint2"), 0.0, 1.0),
+        "ToolLimits": lambda kind: kind(speed=1.0),
+        "Tilt": lambda kind: kind("panda_hand_tcp"),
+        "Clearance": lambda kind: kind([wall]),
+        "EndConfiguration": lambda kind: kind(PANDA_HOME),
+        "PositionDependentVelocityLimits": lambda kind: kind(3.0),
+        **{f"{end}{rate}": lambda kind: kind(np.zeros(7)) for end in ("Start", "End")
+           for rate in ("Velocity", "Acceleration")},
+    }  # fmt: skip
+    kind = getattr(sm.constraints, name)
+    if not (isinstance(kind, type) and issubclass(kind, sm.constraints.Constraint)):
+        return
+    if kind is sm.constraints.Constraint:
+        return
+    item = asked.get(name, lambda kind: kind())(kind)
+    if item.kept_moving:
+        assert Replanner(panda, constraints=[item]).limits.shape == (4, 7)
+        return
+    with pytest.raises(sm.errors.ProblemError, match=f"{name} is not kept while moving"):
+        Replanner(panda, constraints=[item])

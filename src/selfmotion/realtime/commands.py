@@ -61,6 +61,13 @@ def kept_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envel
                 f"constraint {type(item).__name__} is not kept while moving, expected limits of "
                 f"joint position, velocity, acceleration and jerk, or a Clearance"
             )
+        unkept = [quantity.name for quantity in item.envelope(robot).quantities]
+        if unkept:
+            raise ProblemError(
+                f"constraint {type(item).__name__} says that it is kept while moving, but its "
+                f"envelope has the quantity '{unkept[0]}', which the loop does not keep; expected "
+                f"kept_moving = False"
+            )
     kinds = {type(item) for item in constraints}
     # Without given ones, those of the arm and its maker.
     asked = [*constraints, *(kind() for kind in _USUAL if kind not in kinds)]
@@ -235,6 +242,18 @@ class Segment:
         for name in ("t", "q", "qd", "qdd", "tool_error"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
+    @property
+    def travelled(self) -> Array:
+        """Upper bounds of the path lengths of joints from the first sample on, (K, n).
+
+        Between samples q̇ is quadratic, and nowhere larger than the largest of its control points
+        q̇, q̇ + ½ h q̈ and the next q̇.
+        """
+        h = float(self.t[1] - self.t[0])
+        before, after = self.qd[:-1], self.qd[1:]
+        fastest = np.max(np.abs([before, before + 0.5 * h * self.qdd[:-1], after]), axis=0)
+        return np.vstack([np.zeros(self.q.shape[1]), np.cumsum(h * fastest, axis=0)])
+
     def index(self, t: npt.ArrayLike) -> int:
         """Return the sample to command at a time [s]: the last one from the end on."""
         step = self.t[1] - self.t[0]
@@ -294,6 +313,8 @@ class Commands:
         # Those of the M - 1 cycles before.
         self._past = np.zeros((mean - 1, 3, robot.dof))
         self.lead = 0.5 * (mean - 1) * cycle
+        # What is left of the last segment, from the present cycle on.
+        self._rest = self._states.copy()
         self._sent = np.zeros((round(latency / cycle) + 1, robot.dof))
         self.time = 0.0
 
@@ -323,6 +344,8 @@ class Commands:
         # Where it has come to rest, it rested before.
         beyond = min(passed - here, len(past))
         self._past[:] = np.vstack([past[beyond:], np.repeat(self._states[here][None], beyond, 0)])
+        left = len(self._states) - here
+        self._rest[:left], self._rest[left:] = self._states[here:], self._states[-1]
         self._states[0] = self._states[here]
         self.time += passed * self._cycle
         return passed * self._cycle
@@ -374,11 +397,19 @@ class Commands:
         return follows
 
     def segment(
-        self, first: int, flag: Flag, reasons: tuple[str, ...], follows: bool, error: Array
+        self, first: int | None, flag: Flag, reasons: tuple[str, ...], follows: bool, error: Array
     ) -> Segment:
-        """Return the commands: from cycle `first` on, the arm is brought to rest."""
+        """Return the commands: from cycle `first` on, the arm is brought to rest.
+
+        None for the rest of the last segment.
+        """
         h = self._cycle
-        end = law.brake(self._states, first, self._limits, h)
+        if first is None:
+            self._states[:] = self._rest
+            moves = np.flatnonzero(self._states[:, 1:].any(axis=(1, 2)))
+            end = min(int(moves[-1]) + 1, len(self._states) - 1) if moves.size else 0
+        else:
+            end = law.brake(self._states, first, self._limits, h)
         # After the end the arm rests.
         self._states[end + 1 :] = self._states[end]
         end = max(end + len(self._past), 1)

@@ -282,8 +282,25 @@ class Replanner:
                 first = self._cycles
             else:
                 flag = Flag.STOPPING
+        issued = commands.segment(first, flag, tuple(reasons), follows, error)
+        unproved = self._unproved(issued)
+        if unproved:
+            # What was proved before runs to its rest.
+            reasons.append(unproved)
+            flag, follows = Flag.STOPPING, False
+            issued = commands.segment(None, flag, tuple(reasons), follows, error)
         self._follows = follows or flag is Flag.STOPPING
-        return commands.segment(first, flag, tuple(reasons), follows, error)
+        return issued
+
+    def _unproved(self, segment: Segment) -> str:
+        """Return why a segment is not proved to keep the arm clear of bodies; "" where it is.
+
+        Where the arm is expected: off its command as it is now.
+        """
+        if self._around is None:
+            return ""
+        q, times = segment.q + self._commands.deviation, segment.t - segment.t[0]
+        return self._around.unproved(q, segment.travelled, times)
 
     def _start(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)

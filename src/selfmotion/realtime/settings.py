@@ -89,3 +89,11 @@ CLEAR_FOR = 0.5
 LEAVING = 0.05
 # Decrease of a distance that counts as none [m].
 NEARER = 1e-4
+# Distance from which on pairs of meshes are far [m]: hulls always overlap there.
+FAR_MESHES = 0.03
+# Intervals of a segment on which its clearance is proved first …
+FIRST_CHECKS = 4
+# … of such pairs, which take a hundred times as long …
+FIRST_OF_MESHES = 1
+# … and largest number of configurations that are measured for it: they take time.
+MOST_CHECKS = 96
