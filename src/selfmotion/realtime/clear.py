@@ -1,11 +1,10 @@
 """Clearance from obstacles that move."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, nearest
+from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
 from selfmotion.model.collision import ClearanceModel, CollisionModel, how_near
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, as_pose
@@ -164,7 +163,7 @@ class Surroundings:
                 [max(self._displaced.get(name, 0.0) for name in pair) for pair in proof.pairs]
             )
             arms = proof.levers + np.where(proof.levers > 0.0, more[:, None], 0.0)
-            undecided = _undecided(proof, arms, q, travelled)
+            undecided = proof.undecided(arms, q, travelled)
             if undecided is not None:
                 row, pair, near = undecided
                 first, second = proof.pairs[pair]
@@ -175,13 +174,14 @@ class Surroundings:
         return ""
 
 
-class _Proof(NamedTuple):
+class _Proof:
     """Pairs of bodies whose distances are proved.
 
-    Attributes
+    Parameters
     ----------
     measure : callable
-        Configurations (K, n) → lower bounds of distances (K, P) [m], exact where they are small.
+        Configurations (K, n), and which pairs are asked for (P,) → lower bounds of distances (K, P)
+        [m], exact where they are small; of the others any.
     pairs : tuple of (str, str)
     far : float
         The distance to keep [m].
@@ -189,56 +189,93 @@ class _Proof(NamedTuple):
         See `CollisionModel.pair_levers`.
     first : int
         Intervals to begin with.
+    remembers : bool
+        Whether no pair moves but by the joints, so that what was measured last may decide.
     """
 
-    measure: Callable[[Array], Array]
-    pairs: tuple[tuple[str, str], ...]
-    far: float
-    levers: Array
-    first: int
+    def __init__(
+        self,
+        measure: Callable[[Array, Flags], Array],
+        pairs: tuple[tuple[str, str], ...],
+        far: float,
+        levers: Array,
+        first: int,
+        remembers: bool,
+    ) -> None:
+        self.pairs, self.far, self.levers = pairs, far, levers
+        self._measure, self._first, self._remembers = measure, first, remembers
+        # Of each pair the last distance that was measured, and where.
+        self._known, self._where = np.full(len(pairs), -np.inf), np.zeros_like(levers)
+
+    def undecided(self, levers: Array, q: Array, travelled: Array) -> tuple[int, int, float] | None:
+        """Return a cycle, the pair and its distance there, where no bound decides; None for all."""
+        way = (levers * (np.abs(q[0] - self._where) + travelled[-1])).sum(axis=1)
+        # Written so that NaN decides nothing.
+        asked = ~(self._known - way >= self.far)
+        if not asked.any():
+            return None
+
+        def measured(rows: Ints) -> Array:
+            return np.where(asked, self._measure(q[rows], asked), np.inf)
+
+        edges = np.linspace(0, len(q) - 1, self._first + 1).round().astype(np.intp)
+        edges = np.unique(edges)
+        values = measured(edges)
+        bounded = asked
+        if self._remembers:
+            self._known[asked], self._where[asked] = values[0, asked], q[0]
+            # Meshes that are nearer all the time would take a hundred measurements: these are only
+            # measured at the ends.
+            bounded = asked & (values[0] >= self.far)
+        need = np.minimum(self.far, values[0] - NEARER)
+        counted = np.where(bounded[:, None], levers, 0.0)
+        return _bisected(measured, edges, values, need, travelled, counted)
 
 
-def _proofs_of(model: ClearanceModel, far: float) -> Iterator[_Proof]:
-    """Yield the pairs of hulls, and those that are left out there, by their meshes."""
-    yield _Proof(
-        lambda q: model.clearances(q).values, model.pairs, far, model.pair_levers, FIRST_CHECKS
-    )
-    if model.left_out:
-        meshes, near = model.of_left_out(), far + FAR_MESHES
-        yield _Proof(
-            lambda q: meshes.distances(q, near, near),
-            meshes.pairs,
-            far,
-            meshes.pair_levers,
-            FIRST_OF_MESHES,
-        )
-
-
-def _undecided(
-    proof: _Proof, levers: Array, q: Array, travelled: Array
+def _bisected(
+    measured: Callable[[Ints], Array],
+    edges: Ints,
+    values: Array,
+    need: Array,
+    travelled: Array,
+    levers: Array,
 ) -> tuple[int, int, float] | None:
-    """Return a cycle, the pair and its distance there, where no bound decides; None if all do."""
-    edges = np.unique(np.linspace(0, len(q) - 1, proof.first + 1).round().astype(np.intp))
-    values = proof.measure(q[edges])
-    if not values.size:
-        return None
-    need = np.minimum(proof.far, values[0] - NEARER)
+    """Return where bounds between cycles do not decide whether pairs keep what they need (P,)."""
     first, last, near, then = edges[:-1], edges[1:], values[:-1], values[1:]
     count = len(edges)
     while True:
         way = (travelled[last] - travelled[first]) @ levers.T
         # Written so that NaN decides nothing.
-        kept = (near >= need) & (then >= need) & (0.5 * (near + then - way) >= need)
+        inside = (near >= need) & (then >= need)
+        kept = inside & (0.5 * (near + then - way) >= need)
         open_ = np.flatnonzero(~kept.all(axis=1))
         if not open_.size:
             return None
         middle = (first[open_] + last[open_]) // 2
-        broken = ~((near >= need) & (then >= need)).all(axis=1)
+        broken = ~inside.all(axis=1)
         count += len(middle)
         if broken.any() or count > MOST_CHECKS or (middle == first[open_]).any():
             row = int(np.argmax(broken)) if broken.any() else int(open_[0])
             pair = int(np.argmin(np.minimum(near, then)[row] - need))
             return int(last[row]), pair, float(min(near[row, pair], then[row, pair]))
-        inner = proof.measure(q[middle])
+        inner = measured(middle)
         first, last = np.append(first[open_], middle), np.append(middle, last[open_])
         near, then = np.vstack([near[open_], inner]), np.vstack([inner, then[open_]])
+
+
+def _proofs_of(model: ClearanceModel, far: float) -> Iterator[_Proof]:
+    """Yield the pairs of hulls, and those that are left out there, by their meshes."""
+
+    def of_hulls(q: Array, asked: Flags) -> Array:
+        return model.clearances(q).values
+
+    yield _Proof(of_hulls, model.pairs, far, model.pair_levers, FIRST_CHECKS, remembers=False)
+    if not model.left_out:
+        return
+    meshes, near = model.of_left_out(), far + FAR_MESHES
+
+    def of_meshes(q: Array, asked: Flags) -> Array:
+        wanted = np.broadcast_to(np.where(asked, near, -np.inf), (len(q), len(asked)))
+        return meshes.distances(q, wanted, wanted)
+
+    yield _Proof(of_meshes, meshes.pairs, far, meshes.pair_levers, FIRST_OF_MESHES, remembers=True)
