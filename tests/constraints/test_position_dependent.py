@@ -65,6 +65,14 @@ def test_plans_keep_what_plans_by_the_urdf_alone_exceed(seed: int) -> None:
     assert any(isinstance(item, Limits) for item in problem.constraints)
 
 
+def test_the_fastest_motion_keeps_off_where_no_joint_may_move() -> None:
+    """Its joint path is planned without limits of the pace, but not to where there is no pace."""
+    found = sm.fastest(franka.fast_line(robot_named("fr3"), 1)).plan
+    assert found.certificate.verified, found.certificate.verdict
+    t = np.linspace(0.0, found.trajectory.duration, 20_001)
+    assert franka.refusals(found.trajectory(t), found.trajectory(t, 1), RESTS) == 0
+
+
 def by_position(curves: BrakingCurves) -> VelocityByPosition:
     """Return the requirement of the planar arm."""
     names = tuple(f"joint{k + 1}" for k in range(len(curves.lower)))
