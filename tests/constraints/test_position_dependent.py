@@ -45,7 +45,7 @@ def test_the_constraint_keeps_the_laws(arm: str) -> None:
     testing.check_constraint(limits, sm.Problem(robot, path, "position", start))
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", [0, 1, 7])
 def test_plans_keep_what_plans_by_the_urdf_alone_exceed(seed: int) -> None:
     problem = franka.fast_line(robot_named("fr3"), seed)
     alone = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
