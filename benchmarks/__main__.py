@@ -102,6 +102,10 @@ BENCHMARKS = {
         "costs and verdicts of all these problems against what is kept: what is lost, and dearer",
         Run("lost.py", short="--every 300"),
     ),
+    "fr3_limits": Benchmark(
+        "1,000 fast lines of a Franka Research 3, judged by its maker's limits of velocity",
+        Run("fr3_limits.py", short="--count 3"),
+    ),
     "margins": Benchmark(
         "by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged",
         Run("margins.py", short="--count 2 --displacements 2"),

@@ -41,7 +41,7 @@ GROUPS = {
     "To and from other programs": (
         "ros2_handover", "foreign_motion", "placement_map", "dask_cluster",
     ),
-    "While the arm moves": ("moving_target", "udp_bridge"),
+    "While the arm moves": ("moving_target", "policy_chunks", "udp_bridge"),
     "Parts of one's own": (
         "own_cost", "own_constraint", "own_path", "own_null_motion", "own_obstacle",
         "own_optimizer",

@@ -192,21 +192,23 @@ def test_a_clearance_that_is_given_as_collision_is_kept_while_moving(tmp_path: P
         replanner_of(replace(problem, clearance=apart))
         replanner_of(problem)
     assert apart in asked[0]
-    assert not any(isinstance(item, sm.constraints.Clearance) for item in asked[1])
+    # By default the arm keeps off itself, as in plans.
+    assert any(isinstance(item, sm.constraints.Clearance) for item in asked[1])
 
 
-def test_a_file_without_constraints_is_followed_and_jerks_that_are_asked_for_are_not(
-    tmp_path: Path,
-) -> None:
-    """The maker's limits of the jerk are the default of plans; the loop keeps none."""
+def test_a_file_without_constraints_is_followed_within_the_makers_limits(tmp_path: Path) -> None:
     file = written(tmp_path)
     text, _ = file.read_text().split("[[constraints]]")
     file.write_text(text)
-    limits = replanner_of(sm.read_problem(file)).limits
+    replanner = replanner_of(sm.read_problem(file))
     panda = robot_named("panda")
-    np.testing.assert_array_equal(limits[2:], [panda.velocity_limit, panda.acceleration_limit])
-    file.write_text(text + '[[constraints]]\nkind = "JointJerkLimits"\n')
-    assert "constraint JointJerkLimits is not kept while moving" in complaint("follow", file)
+    expected = [panda.velocity_limit, panda.acceleration_limit]
+    np.testing.assert_array_equal(replanner.limits[2:], expected)
+    np.testing.assert_array_equal(replanner.jerk_limit, panda.jerk_limit)
+    file.write_text(text + '[[constraints]]\nkind = "JointJerkLimits"\nlimit = 2000\n')
+    assert np.all(replanner_of(sm.read_problem(file)).jerk_limit == 2000.0)
+    file.write_text(text + '[[constraints]]\nkind = "ToolLimits"\nspeed = 0.2\n')
+    assert "constraint ToolLimits is not kept while moving" in complaint("follow", file)
 
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:

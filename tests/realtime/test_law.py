@@ -11,6 +11,7 @@ from selfmotion.realtime import law
 from selfmotion.realtime.law import (
     braking_distance,
     fastest,
+    fastest_on_curve,
     saturated_rates,
     tightened,
     viable_accelerations,
@@ -56,7 +57,14 @@ def test_the_self_motion_gives_before_the_tool_does(panda: sm.RobotModel) -> Non
 
 def random_limits(rng: np.random.Generator, n: int = 7) -> Array:
     lower, upper = -rng.uniform(0.01, 3.0, n), rng.uniform(0.01, 3.0, n)
-    return np.array([lower, upper, rng.uniform(0.1, 3.0, n), rng.uniform(0.5, 20.0, n)])
+    rates = rng.uniform(0.1, 3.0, n), rng.uniform(0.5, 20.0, n)
+    # Of curves, some much steeper than the joint brakes, and some that are none.
+    hard, offset = 10.0 ** rng.uniform(-0.3, 2.0, n), rng.uniform(0.0, 0.4, n)
+    # They let a joint rest at its limits.
+    beyond_rest = offset**2 / (2.0 * hard) + rng.uniform(0.0, 0.1, n)
+    beyond_rest[rng.random(n) < 0.2] = np.inf
+    curves = hard, offset, lower - beyond_rest, upper + beyond_rest
+    return np.array([lower, upper, *rates, *curves])
 
 
 def nonsense(rng: np.random.Generator, cycles: int) -> Array:
@@ -88,7 +96,10 @@ def commanded(rng: np.random.Generator, cycles: int, limits: Array, h: float) ->
 def beyond(limits: Array, states: Array) -> float:
     """Return by how much states (N, 3, n) are beyond limits, less than 0 where they are within."""
     c, w, a = states[:, 0], states[:, 1], states[:, 2]
-    sides = limits[0] - c, c - limits[1], np.abs(w) - limits[2], np.abs(a) - limits[3]
+    hard, offset, first, last = limits[4:]
+    rising, falling = (np.maximum(x + offset, 0.0) ** 2 / (2.0 * hard) for x in (w, -w))
+    curves = rising + c - last, falling - c + first
+    sides = limits[0] - c, c - limits[1], np.abs(w) - limits[2], np.abs(a) - limits[3], *curves
     # What is no number is beyond all.
     return float(np.nan_to_num(np.max(sides), nan=np.inf))
 
@@ -103,7 +114,8 @@ def test_whatever_is_asked_for_limits_hold_for_ever(seed: int) -> None:
 
 
 def test_the_law_of_limits_rejects_a_command_that_is_only_clipped() -> None:
-    limits, h = np.array([[-0.5], [0.5], [2.0], [10.0]]), 1e-3
+    none = [[1.0], [0.0], [-np.inf], [np.inf]]
+    limits, h = np.array([[-0.5], [0.5], [2.0], [10.0], *none]), 1e-3
     states = np.zeros((1001, 3, 1))
     for cycle in range(1000):
         a = float(np.clip((limits[2] - states[cycle, 1]) / h, -limits[3], limits[3])[0])
@@ -139,6 +151,33 @@ def test_the_fastest_rate_uses_all_the_room(seed: int) -> None:
     assert h * w + braking_distance(w, most, h) == pytest.approx(room, rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(50))
+def test_the_fastest_rate_on_a_curve_is_the_largest_from_which_braking_stays_below(
+    seed: int,
+) -> None:
+    """Against braking itself, cycle by cycle: just below it is kept, just above it is broken."""
+    rng = np.random.default_rng(seed)
+    most, hard, offset = rng.uniform(0.5, 20.0), 10.0 ** rng.uniform(-0.3, 2.0), rng.uniform(0, 0.4)
+    h = 1e-3
+    room = offset**2 / (2.0 * hard) + 10.0 ** rng.uniform(-3, 1)
+    w = fastest_on_curve(room, most, hard, offset, h)
+    assert curve_missed(0.999 * w, room, most, hard, offset, h) <= 1e-9
+    # Where the parabola touches the curve, by a cycle of braking less than it might be.
+    assert curve_missed(1.01 * w + 2.0 * h * most, room, most, hard, offset, h) > 0.0
+
+
+def curve_missed(w: float, room: float, most: float, hard: float, offset: float, h: float) -> float:
+    """Return by how much a joint exceeds its curve while it brakes from w, at the end of cycles."""
+    c, worst = 0.0, -np.inf
+    while True:
+        c += h * w
+        worst = max(worst, max(w + offset, 0.0) ** 2 / (2.0 * hard) + c - room)
+        if w <= 0.0:
+            return float(worst)
+        w = max(w - h * most, 0.0)
+
+
 def test_a_box_without_any_acceleration_to_choose_is_no_trouble() -> None:
-    low, high = viable_accelerations(1.0, 0.0, -1.0, 1.0, 1.0, 5.0, 1e-3)
+    numbers = [-1.0, 1.0, 1.0, 5.0, 1.0, 0.0, -np.inf, np.inf]
+    low, high = viable_accelerations(1.0, 0.0, np.array(numbers)[:, None], 0, 1e-3)
     assert low <= high <= 0.0

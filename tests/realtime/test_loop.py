@@ -61,6 +61,8 @@ def test_the_judge_of_scenarios_rejects_a_jump_and_a_broken_limit(
     assert "a jump" in scenarios.limits_broken(replanner, arm)[0]
     arm.commanded[5] = (q, qd, 1.01 * replanner.limits[3])
     assert "acceleration beyond its limit" in scenarios.limits_broken(replanner, arm)
+    arm.commanded[5] = (q, qd, qdd + 1.01 * replanner.jerk_limit * replanner.cycle)
+    assert "jerk beyond its limit" in scenarios.limits_broken(replanner, arm)
     arm.commanded[5] = (np.full(7, np.nan), qd, qdd)
     assert scenarios.limits_broken(replanner, arm) == ["not finite"]
 

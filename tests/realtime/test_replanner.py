@@ -61,6 +61,46 @@ def test_each_segment_ends_at_rest_and_keeps_all_limits(
         assert np.all(segment.qdd[-1] == 0.0)
         assert np.all(np.abs(segment.qdd) <= replanner.limits[3])
         assert segment.t[-1] - segment.t[0] > replanner.period
+        jerk = np.abs(np.diff(segment.qdd, axis=0)) / replanner.cycle
+        assert np.all(jerk <= replanner.jerk_limit)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_jerks_keep_limits_also_where_the_path_jumps(panda: sm.RobotModel, share: float) -> None:
+    """Between any two cycles, from the commands alone; without the limit they are exceeded."""
+    worst = []
+    for limit in (share * panda.jerk_limit, 1e9):
+        constraints = [sm.constraints.JointJerkLimits(limit, replace=True)]
+        replanner = Replanner(panda, "position", constraints=constraints)
+        t, q, qd, commands = 0.0, PANDA_HOME, np.zeros(7), []
+        for k in range(60):
+            pose = panda.pose(PANDA_HOME)
+            pose.translation[1] += 0.05 * (-1.0) ** (k // 10)
+            segment = replanner.step(t, q, qd, target=pose)
+            t += replanner.period
+            now = segment.index(t)
+            q, qd = segment.q[now], segment.qd[now]
+            commands.append(segment.qdd[:now])
+        jerk = np.abs(np.diff(np.concatenate(commands), axis=0)) / replanner.cycle
+        worst.append(float((jerk / (share * panda.jerk_limit)).max()))
+    assert worst[0] <= 1.0 + 1e-9
+    assert worst[1] > 1.0
+
+
+def test_an_arm_that_moves_at_first_goes_on_from_there(panda: sm.RobotModel) -> None:
+    qd = np.array([0.3, -0.2, 0.1, 0.2, 0.0, -0.1, 0.4])
+    segment = Replanner(panda).step(
+        0.0, PANDA_HOME, qd, sm.paths.Dwell(panda.pose(PANDA_HOME), 1.0)
+    )
+    assert np.abs(segment.q[0] - PANDA_HOME).max() <= SAME
+    assert np.abs(segment.qd[0] - qd).max() <= SAME
+    assert np.abs(segment.qdd[0]).max() <= SAME
+
+
+def test_jerks_that_only_a_long_mean_would_keep_are_refused(panda: sm.RobotModel) -> None:
+    limits = sm.constraints.JointJerkLimits(100.0)
+    with pytest.raises(sm.errors.ProblemError, match="JointAccelerationLimits of 1 rad/s²"):
+        Replanner(panda, constraints=[limits])
 
 
 def test_the_same_inputs_give_the_same_segments(
@@ -211,3 +251,41 @@ def test_a_first_state_in_degrees_is_asked_about(
         with pytest.raises(sm.errors.StartError, match=rad) as caught:
             Replanner(panda).step(0.0, q, np.zeros(7), slow_circle)
         assert ("in degrees?" in str(caught.value)) is asked
+
+
+def test_a_quantity_that_claims_to_be_kept_is_refused(panda: sm.RobotModel) -> None:
+    """Else it would be left out in silence."""
+
+    class Claimed(sm.constraints.Band):
+        kept_moving = True
+
+    band = Claimed(sm.robot.JointCoordinate("panda_joint2"), 0.0, 1.0)
+    with pytest.raises(sm.errors.ProblemError, match="Claimed says that it is kept while moving"):
+        Replanner(panda, constraints=[band])
+
+
+@pytest.mark.parametrize("name", sm.constraints.__all__)
+def test_each_constraint_is_kept_or_refused_by_name(panda: sm.RobotModel, name: str) -> None:
+    """None is left out in silence: of all that a problem may have."""
+    wall = sm.obstacles.Sphere("wall", np.array([0.0, 0.0, 9.0]), 0.1)
+    asked = {
+        "Band": lambda kind: kind(sm.robot.JointCoordinate("panda_joint2"), 0.0, 1.0),
+        "ToolLimits": lambda kind: kind(speed=1.0),
+        "Tilt": lambda kind: kind("panda_hand_tcp"),
+        "Clearance": lambda kind: kind([wall]),
+        "EndConfiguration": lambda kind: kind(PANDA_HOME),
+        "PositionDependentVelocityLimits": lambda kind: kind(3.0),
+        **{f"{end}{rate}": lambda kind: kind(np.zeros(7)) for end in ("Start", "End")
+           for rate in ("Velocity", "Acceleration")},
+    }  # fmt: skip
+    kind = getattr(sm.constraints, name)
+    if not (isinstance(kind, type) and issubclass(kind, sm.constraints.Constraint)):
+        return
+    if kind is sm.constraints.Constraint:
+        return
+    item = asked.get(name, lambda kind: kind())(kind)
+    if item.kept_moving:
+        assert Replanner(panda, constraints=[item]).limits.shape == (4, 7)
+        return
+    with pytest.raises(sm.errors.ProblemError, match=f"{name} is not kept while moving"):
+        Replanner(panda, constraints=[item])

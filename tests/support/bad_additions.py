@@ -8,6 +8,7 @@ import numpy as np
 import yaml
 
 import selfmotion as sm
+from selfmotion import realtime
 from support.arms import PANDA_HOME, robot_named
 from support.bad_rows import Row
 from support.bad_values import (
@@ -408,6 +409,25 @@ def _replanner_rows() -> list[Row]:
         ),
         *bad_values_of(
             area, "replanner.step", sound(stepped), t={"NaN": NAN, "None": None}, q=state, qd=state
+        ),
+        *bad_values_of(
+            area,
+            "realtime.Chunk.of",
+            sound(realtime.Chunk.of, times=[0.0, 1.0], poses=[np.eye(4)] * 2),
+            times={
+                "None": None,
+                "[0, 0]": [0, 0],
+                "[1, 0]": [1, 0],
+                "of three poses": [0, 1, 2],
+                "NaN": [0.0, NAN],
+            },
+            poses={"None": None, "'poses'": "poses", "one": [np.eye(4)], "[1, 2]": [1, 2]},
+        ),
+        Row(area, "a chunk without times", lambda _: stepped(path=None, chunk=[np.eye(4)] * 2)),
+        Row(
+            area,
+            "a chunk and a path",
+            lambda _: stepped(chunk=[np.eye(4)] * 2, times=[0.0, 1.0]),
         ),
         Row(
             area,

@@ -80,6 +80,18 @@ def constraint_rows() -> list[Row]:
         ),
         *bad_values_of(
             area,
+            "PositionDependentVelocityLimits",
+            lambda **given: kept(sm.constraints.PositionDependentVelocityLimits)(
+                **{"deceleration": 2.0, **given}
+            ),
+            deceleration={**rates, "inf": np.inf},
+            offset={**bounds, "-1": -1, "[0, 0, 99], no room to move": [0, 0, 99]},
+            lower={**bounds, "[9, 9, 9]": [9] * 3},
+            upper={**bounds, "[-9, -9, -9]": [-9] * 3},
+            margin=margins,
+        ),
+        *bad_values_of(
+            area,
             "EndConfiguration",
             kept(sm.constraints.EndConfiguration),
             q={

@@ -159,6 +159,9 @@ def limits_broken(replanner: Replanner, arm: SimulatedArm) -> list[str]:
         faults.append("speed beyond its limit")
     if np.any(np.abs(qdd) > hardest * (1.0 + ROUNDING)):
         faults.append("acceleration beyond its limit")
+    jerk = np.abs(np.diff(qdd, axis=0)) / h
+    if np.any(jerk > replanner.jerk_limit * (1.0 + ROUNDING)):
+        faults.append("jerk beyond its limit")
     # The samples are one motion, with an acceleration that is linear between them: no jump.
     fits = np.abs(np.diff(qd, axis=0) - 0.5 * h * (qdd[1:] + qdd[:-1])).max()
     moved = np.diff(q, axis=0) - h * qd[:-1] - h * h / 6.0 * (2.0 * qdd[:-1] + qdd[1:])

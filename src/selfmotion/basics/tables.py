@@ -220,7 +220,8 @@ def _number(cell: str, where: str, mark: str) -> float:
 # TOML, JSON and YAML files as nested tables, with SI units throughout.
 
 # Keys with a number for each joint.
-PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
+_RATES = ("deceleration", "limit", "offset")
+PER_JOINT = (*_RATES, "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
 # Keys that may end in _deg or _mm: nothing else is an angle or a length, or a rate of one.
 _BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
 # Values above a turn are in degrees.

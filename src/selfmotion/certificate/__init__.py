@@ -4,6 +4,10 @@ from selfmotion.certificate.bounding import (
     BoundedFunction as BoundedFunction,
     MotionSegments as MotionSegments,
 )
+from selfmotion.certificate.braking import (
+    BrakingCurves as BrakingCurves,
+    VelocityByPosition as VelocityByPosition,
+)
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.limits import (
     ARRIVED as ARRIVED,
@@ -47,10 +51,12 @@ from selfmotion.certificate.verdict import (
 )
 
 __all__ = [
+    "BrakingCurves",
     "Column",
     "Extreme",
     "Finding",
     "FinishedMotion",
     "Quantity",
     "Requirement",
+    "VelocityByPosition",
 ]

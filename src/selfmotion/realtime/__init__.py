@@ -1,5 +1,6 @@
 """Motions planned while the arm moves: the next seconds, again and again."""
 
+from selfmotion.realtime.chunks import Blended as Blended, Chunk as Chunk
 from selfmotion.realtime.commands import Flag as Flag, Segment as Segment
 from selfmotion.realtime.loop import (
     Plant as Plant,

@@ -24,6 +24,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.costs import Cost
+from selfmotion.realtime.chunks import Blended, Chunk
 from selfmotion.realtime.reference import Approach, MovingPose
 
 
@@ -98,8 +99,42 @@ def observed_target(
         return None
 
 
+def known_chunk(
+    path: object, target: object, times: Any, chunk: Any, t: float, reasons: list[str]
+) -> Chunk | None:
+    """Return a chunk of poses at times; None where it is of no use, and add the reason.
+
+    A policy that fails must not leave the arm without a command.
+
+    Raises
+    ------
+    ProblemError
+        There is a path or a target, too, or one of chunk and times is missing.
+    """
+    if path is not None or target is not None:
+        raise ProblemError(
+            "chunk: there is a path or a target, too; expected one of the three at a step"
+        )
+    if chunk is None or times is None:
+        missing = "chunk" if chunk is None else "times"
+        raise ProblemError(
+            f"{missing} is missing: a chunk is poses and their times: give chunk= and times="
+        )
+    try:
+        found = Chunk.of(times, chunk)
+    except PathError as error:
+        reasons.append(f"the chunk is of no use: {error}")
+        return None
+    if found.until < t:
+        reasons.append(f"the chunk is left out: it ended {t - found.until:.3g} s ago")
+        return None
+    return found
+
+
 def age_of_target(path: Path | None, t: float) -> float:
     """Return the age of a target's observation [s]; 0 of a path, which is none."""
+    if isinstance(path, Chunk | Blended):
+        return 0.0
     while path is not None and not isinstance(path, MovingPose):
         # Of derived paths, the original.
         path = next((item for item in vars(path).values() if isinstance(item, Path)), None)

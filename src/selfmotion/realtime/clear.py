@@ -1,15 +1,25 @@
 """Clearance from obstacles that move."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, nearest
+from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
 from selfmotion.model.collision import ClearanceModel, CollisionModel, how_near
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, as_pose
 from selfmotion.problem.costs import Samples
-from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, LEVEL, NEARER
+from selfmotion.realtime.settings import (
+    CLEAR_FOR,
+    CLEARANCE_MARGIN,
+    FAR_MESHES,
+    FIRST_CHECKS,
+    FIRST_OF_MESHES,
+    LEAVING,
+    LEVEL,
+    MOST_CHECKS,
+    NEARER,
+)
 
 
 class Surroundings:
@@ -49,6 +59,9 @@ class Surroundings:
                         f"that of '{obstacle}' always contains '{link}': close its mesh, which is "
                         f"then taken apart, or give its parts as obstacles of their own"
                     )
+        self._proofs = [proof for model, far in self._models for proof in _proofs_of(model, far)]
+        # By how much bodies on links are displaced from where they were at first [m].
+        self._displaced: dict[str, float] = {}
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, SE3]) -> None:
@@ -62,7 +75,20 @@ class Surroundings:
                 )
             for (model, _), names in zip(self._models, self._names, strict=True):
                 if name in names:
-                    model.move(name, as_pose(pose, f"obstacle '{name}'"))
+                    there = as_pose(pose, f"obstacle '{name}'")
+                    self._check_moves(model, name)
+                    model.move(name, there)
+                    self._displaced[name] = model.displacement(name, there)
+
+    def _check_moves(self, model: ClearanceModel, name: str) -> None:
+        """Raise ProblemError for a body on a link of which some distance is that of meshes."""
+        for pair in model.left_out:
+            if name in pair:
+                raise ProblemError(
+                    f"obstacle '{name}' cannot be moved: its hull always overlaps that of "
+                    f"'{pair[pair[0] == name]}', and their meshes are measured where they were "
+                    f"first; give it convex parts as obstacles of their own"
+                )
 
     def distances(self, q: Array) -> Array:
         """Return the smallest distance at configurations (K, n), levelled off, (K,) [m]."""
@@ -114,3 +140,142 @@ class Surroundings:
         room = values - np.minimum(distance + CLEARANCE_MARGIN, reached)
         later = found.rows > 0
         return rows[later], room[found.rows, found.columns][later]
+
+    def unproved(self, q: Array, travelled: Array, times: Array) -> str:
+        """Return why a motion is not proved to keep the distances; "" where it is.
+
+        Of each pair the distance, or what it has at the start if that is less. Between two
+        configurations the distance d of a pair changes by Σ_j l_j V_j at most, with V_j the path
+        length of joint j and l_j the pair's lever arm, so that d ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in
+        between (`certificate.separation`). Intervals on which that does not decide are halved.
+
+        Parameters
+        ----------
+        q : (K, n)
+            At cycles [rad or m].
+        travelled : (K, n)
+            Upper bounds of the path lengths of joints since the first one.
+        times : (K,)
+            Since the first one [s].
+        """
+        for proof in self._proofs:
+            more = np.array(
+                [max(self._displaced.get(name, 0.0) for name in pair) for pair in proof.pairs]
+            )
+            arms = proof.levers + np.where(proof.levers > 0.0, more[:, None], 0.0)
+            undecided = proof.undecided(arms, q, travelled)
+            if undecided is not None:
+                row, pair, near = undecided
+                first, second = proof.pairs[pair]
+                return (
+                    f"'{first}' and '{second}' are not proved to keep {proof.far * 1e3:.1f} mm "
+                    f"until {times[row]:.3f} s: they {how_near(near, digits=1)} there"
+                )
+        return ""
+
+
+class _Proof:
+    """Pairs of bodies whose distances are proved.
+
+    Parameters
+    ----------
+    measure : callable
+        Configurations (K, n), and which pairs are asked for (P,) → lower bounds of distances (K, P)
+        [m], exact where they are small; of the others any.
+    pairs : tuple of (str, str)
+    far : float
+        The distance to keep [m].
+    levers : (P, n)
+        See `CollisionModel.pair_levers`.
+    first : int
+        Intervals to begin with.
+    remembers : bool
+        Whether no pair moves but by the joints, so that what was measured last may decide.
+    """
+
+    def __init__(
+        self,
+        measure: Callable[[Array, Flags], Array],
+        pairs: tuple[tuple[str, str], ...],
+        far: float,
+        levers: Array,
+        first: int,
+        remembers: bool,
+    ) -> None:
+        self.pairs, self.far, self.levers = pairs, far, levers
+        self._measure, self._first, self._remembers = measure, first, remembers
+        # Of each pair the last distance that was measured, and where.
+        self._known, self._where = np.full(len(pairs), -np.inf), np.zeros_like(levers)
+
+    def undecided(self, levers: Array, q: Array, travelled: Array) -> tuple[int, int, float] | None:
+        """Return a cycle, the pair and its distance there, where no bound decides; None for all."""
+        way = (levers * (np.abs(q[0] - self._where) + travelled[-1])).sum(axis=1)
+        # Written so that NaN decides nothing.
+        asked = ~(self._known - way >= self.far)
+        if not asked.any():
+            return None
+
+        def measured(rows: Ints) -> Array:
+            return np.where(asked, self._measure(q[rows], asked), np.inf)
+
+        edges = np.linspace(0, len(q) - 1, self._first + 1).round().astype(np.intp)
+        edges = np.unique(edges)
+        values = measured(edges)
+        bounded = asked
+        if self._remembers:
+            self._known[asked], self._where[asked] = values[0, asked], q[0]
+            # Meshes that are nearer all the time would take a hundred measurements: these are only
+            # measured at the ends.
+            bounded = asked & (values[0] >= self.far)
+        need = np.minimum(self.far, values[0] - NEARER)
+        counted = np.where(bounded[:, None], levers, 0.0)
+        return _bisected(measured, edges, values, need, travelled, counted)
+
+
+def _bisected(
+    measured: Callable[[Ints], Array],
+    edges: Ints,
+    values: Array,
+    need: Array,
+    travelled: Array,
+    levers: Array,
+) -> tuple[int, int, float] | None:
+    """Return where bounds between cycles do not decide whether pairs keep what they need (P,)."""
+    first, last, near, then = edges[:-1], edges[1:], values[:-1], values[1:]
+    count = len(edges)
+    while True:
+        way = (travelled[last] - travelled[first]) @ levers.T
+        # Written so that NaN decides nothing.
+        inside = (near >= need) & (then >= need)
+        kept = inside & (0.5 * (near + then - way) >= need)
+        open_ = np.flatnonzero(~kept.all(axis=1))
+        if not open_.size:
+            return None
+        middle = (first[open_] + last[open_]) // 2
+        broken = ~inside.all(axis=1)
+        count += len(middle)
+        if broken.any() or count > MOST_CHECKS or (middle == first[open_]).any():
+            row = int(np.argmax(broken)) if broken.any() else int(open_[0])
+            pair = int(np.argmin(np.minimum(near, then)[row] - need))
+            return int(last[row]), pair, float(min(near[row, pair], then[row, pair]))
+        inner = measured(middle)
+        first, last = np.append(first[open_], middle), np.append(middle, last[open_])
+        near, then = np.vstack([near[open_], inner]), np.vstack([inner, then[open_]])
+
+
+def _proofs_of(model: ClearanceModel, far: float) -> Iterator[_Proof]:
+    """Yield the pairs of hulls, and those that are left out there, by their meshes."""
+
+    def of_hulls(q: Array, asked: Flags) -> Array:
+        return model.clearances(q).values
+
+    yield _Proof(of_hulls, model.pairs, far, model.pair_levers, FIRST_CHECKS, remembers=False)
+    if not model.left_out:
+        return
+    meshes, near = model.of_left_out(), far + FAR_MESHES
+
+    def of_meshes(q: Array, asked: Flags) -> Array:
+        wanted = np.broadcast_to(np.where(asked, near, -np.inf), (len(q), len(asked)))
+        return meshes.distances(q, wanted, wanted)
+
+    yield _Proof(of_meshes, meshes.pairs, far, meshes.pair_levers, FIRST_OF_MESHES, remembers=True)

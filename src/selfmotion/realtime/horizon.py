@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.certificate import BrakingCurves
 from selfmotion.model.follow import Follows
 from selfmotion.model.kernels import transport
 from selfmotion.model.motion import Grid, NullMotion
@@ -14,6 +15,7 @@ from selfmotion.planning.optimise import minimize_quadratic
 from selfmotion.planning.paper import Rollout
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
+from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION
 from selfmotion.realtime.settings import (
     BADLY,
     BREAKING,
@@ -151,8 +153,8 @@ class Horizon:
     follows : Follows
         Its path is another one at each step.
     costs : sequence of Cost
-    limits : (4, n)
-        Lower, upper, speed, acceleration: targets.
+    limits : (8, n)
+        Lower, upper, speed, acceleration, and the curves (`law.DEVIATION`): targets.
     null_motion : NullMotion
         φ, in the null space.
     duration : float
@@ -201,6 +203,9 @@ class Horizon:
         speeds, hardest = pace[:, : robot.dof], pace[:, robot.dof :]
         self._low = np.stack([places[:, 0], -speeds, -hardest]).ravel()
         self._high = np.stack([places[:, 1], speeds, hardest]).ravel()
+        # Speeds that depend on the position, of the joints for which they do.
+        some = np.flatnonzero(np.isfinite(limits[CURVE_LOWER]) | np.isfinite(limits[CURVE_UPPER]))
+        self._curved, self._curves = some, BrakingCurves(*limits[DECELERATION:, some])
         self._wild = WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
@@ -381,6 +386,10 @@ class Horizon:
     ) -> tuple[Array, Array, Array]:
         """Return rows (R, d) of the limits and distances, and their bounds, (R,) each."""
         rows, low, high = self._rows(samples, by_q, by_qd)
+        if len(self._curved):
+            more, room = self._curve_rows(samples, by_q, by_qd)
+            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
+            low = np.concatenate([low, np.full(len(more), -np.inf)])
         if self._around is not None:
             more, room = self._around.rows(samples, by_q)
             rows, high = np.vstack([rows, more]), np.concatenate([high, room])
@@ -397,3 +406,13 @@ class Horizon:
         rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
         slack = BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
+
+    def _curve_rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
+        """Return the limits of speed by position at the nodes, with their upper bounds."""
+        nodes, some, curves = samples.nodes[1:], self._curved, self._curves
+        at, moves = by_q[nodes][:, some], by_qd[nodes][:, some]
+        qd = samples.qd[nodes][:, some]
+        above, below = curves.slopes(qd)
+        rows = np.stack([at + above[..., None] * moves, -at + below[..., None] * moves])
+        room = -curves.excess(samples.q[nodes][:, some], qd)
+        return rows.reshape(-1, self.size), room.ravel()

@@ -33,6 +33,19 @@ from selfmotion.realtime.settings import FOLLOWED, PIVOT
 # (j = 1, 2, …). The states with c + D(w) ≤ upper, c - D(-w) ≥ lower and |w| ≤ V are exactly those
 # from which it can stop in time, and a = -A (or what brings w to 0) leads from each to another
 # one: there is always a next command.
+#
+# Limits of speed may depend on the position, by e(q, q̇) = max(0, q̇ + o)²/(2a) + q - upper ≤ 0
+# and its mirror image (`certificate.BrakingCurves`). Between knots (q, q̇) is a mean, with the
+# weights of q̇, of states (c - s h w, w) with 0 ≤ s ≤ 1 (de Boor's recursion for q, once), and e is
+# convex: what keeps e ≤ 0 at (c, w) of each cycle, and c within what is kept at w ≤ 0, keeps it at
+# all times. A joint that brakes by A ≥ a gets below the curve. By A < a it does as long as w is
+# below w° = A o/(a - A), where both have the same slope; from above, it has to stay below the
+# parabola c + w²/(2A) that touches the curve at w°.
+
+# Rows of an array of limits, (9, n): lower, upper, speed, acceleration; then of the curves the
+# deceleration a, the offset o and where they end, ±inf for none; last, how far the arm is from its
+# command.
+DECELERATION, OFFSET, CURVE_LOWER, CURVE_UPPER, DEVIATION = 4, 5, 6, 7, 8
 
 # Allowance for rounding of limits: the set is smaller by this, relative to each limit.
 _ROUNDING = 1e-9
@@ -59,16 +72,58 @@ def fastest(room: float, most: float, h: float) -> float:
 
 
 @inlined
+def fastest_on_curve(room: float, most: float, hard: float, offset: float, h: float) -> float:
+    """Return the largest w⁺ after which a joint stays below its curve as it brakes.
+
+    Parameters
+    ----------
+    room : float
+        Distance of c from the end of the curve [rad or m].
+    most : float
+        Deceleration A of the joint [rad/s² or m/s²].
+    hard, offset : float
+        Deceleration a and offset o of the curve.
+    h : float
+        Cycle [s].
+    """
+    if room == inf:
+        return inf
+    # h w + (w + o)²/(2a) = room
+    way = max(room + h * offset, 0.0)
+    bound = hard * (sqrt(h * h + 2.0 * way / hard) - h) - offset
+    if most >= hard:
+        return bound
+    touching = most * offset / (hard - most)
+    if bound <= touching:
+        return bound
+    # h w + w²/(2A) = the room up to the parabola's end
+    square = (touching + offset) * (touching + offset)
+    left = room - 0.5 * square / hard + 0.5 * touching * touching / most
+    below = most * (sqrt(h * h + 2.0 * max(left, 0.0) / most) - h)
+    return min(bound, max(touching, below))
+
+
+@inlined
 def viable_accelerations(
-    c: float, w: float, lower: float, upper: float, speed: float, most: float, h: float
+    c: float, w: float, limits: Array, k: int, h: float
 ) -> tuple[float, float]:
-    """Return the least and the largest a after which a joint can still stop.
+    """Return the least and the largest a after which joint k can still stop, limits (8 or 9, n).
 
     Never empty: where rounding, or a state from outside, would make it so, it is the harder
     braking.
     """
-    high = min(most, (speed - w) / h, (fastest(upper - c, most, h) - w) / h)
-    low = max(-most, (-speed - w) / h, (-fastest(c - lower, most, h) - w) / h)
+    most, speed = limits[3, k], limits[2, k]
+    hard, offset = limits[DECELERATION, k], limits[OFFSET, k]
+    up = min(
+        fastest(limits[1, k] - c, most, h),
+        fastest_on_curve(limits[CURVE_UPPER, k] - c, most, hard, offset, h),
+    )
+    down = min(
+        fastest(c - limits[0, k], most, h),
+        fastest_on_curve(c - limits[CURVE_LOWER, k], most, hard, offset, h),
+    )
+    high = min(most, (speed - w) / h, (up - w) / h)
+    low = max(-most, (-speed - w) / h, (-down - w) / h)
     high, low = max(high, -most), min(low, most)
     if low > high:
         low = high = low if w < 0.0 else high
@@ -76,11 +131,11 @@ def viable_accelerations(
 
 
 def tightened(limits: Array) -> Array:
-    """Return limits (4, n) reduced by the allowance for rounding."""
+    """Return limits (8, n) reduced by the allowance for rounding."""
     inner = limits.copy()
-    inner[0] += _ROUNDING
-    inner[1] -= _ROUNDING
-    inner[2:] *= 1.0 - _ROUNDING
+    inner[[0, CURVE_LOWER]] += _ROUNDING
+    inner[[1, CURVE_UPPER]] -= _ROUNDING
+    inner[2:4] *= 1.0 - _ROUNDING
     return inner
 
 
@@ -186,8 +241,8 @@ def command(
         reference. The next row's first entries are set.
     states : (M + 1, 3, n)
         c, w and a; those of `cycle` are given.
-    limits : (5, n)
-        Lower, upper, speed, acceleration, and how far the arm is from its command.
+    limits : (9, n)
+        Of the joints, of their curves, and how far the arm is from its command: see `DEVIATION`.
 
     Returns whether the tool moves as the reference does.
     """
@@ -210,7 +265,7 @@ def command(
         move(states, cycle, k, (rate - w[k]) / h, h)
         if cycle + 1 < table.shape[0]:
             ahead = states[cycle + 1, 0, k] + 0.5 * h * states[cycle + 1, 1, k]
-            table[cycle + 1, k] = ahead + limits[4, k]
+            table[cycle + 1, k] = ahead + limits[DEVIATION, k]
     return follows
 
 
@@ -219,9 +274,7 @@ def viable_rates(state: Array, limits: Array, h: float, low: Array, high: Array)
     """Set the bounds of the rates (n,) of the next cycle, by c, w and a now (3, n)."""
     for k in range(state.shape[1]):
         c, w = state[0, k], state[1, k]
-        low[k], high[k] = viable_accelerations(
-            c, w, limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
-        )
+        low[k], high[k] = viable_accelerations(c, w, limits, k, h)
         low[k], high[k] = w + h * low[k], w + h * high[k]
 
 
@@ -254,9 +307,7 @@ def brake(states: Array, first: int, limits: Array, h: float) -> int:
         share = 1.0 / max(1.0, longest)
         for k in range(n):
             c, w = states[cycle, 0, k], states[cycle, 1, k]
-            low, high = viable_accelerations(
-                c, w, limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
-            )
+            low, high = viable_accelerations(c, w, limits, k, h)
             wish = -w / h if longest <= 1.0 else -w * share / h
             move(states, cycle, k, min(max(wish, low), high), h)
             if longest <= 1.0 and low <= wish <= high:

@@ -41,6 +41,8 @@ class State:
         Where obstacles are by now: name → pose.
     target, twist, seen : optional
         In place of a path; see `Replanner.step`.
+    chunk, times : optional
+        In place of both.
     """
 
     t: float
@@ -51,6 +53,8 @@ class State:
     target: SE3 | npt.ArrayLike | None = None
     twist: npt.ArrayLike | None = None
     seen: float | None = None
+    chunk: Sequence[SE3] | npt.ArrayLike | None = None
+    times: npt.ArrayLike | None = None
 
 
 def follow(
@@ -99,6 +103,8 @@ def follow(
             twist=state.twist,
             # A target without a time was seen when the state was.
             seen=state.t if state.seen is None and state.target is not None else state.seen,
+            chunk=state.chunk,
+            times=state.times,
         )
         write(segment)
         count += 1

@@ -196,7 +196,7 @@ class Reference:
             relative -= rotation[:, 2] * (rotation[:, 2] @ relative)
         slope = np.empty(6)
         slope[:3] = twist[:3] - target.twist[0, :3]
-        slope[3:] = np.linalg.solve(_left_jacobian(offset[3:]), relative)
+        slope[3:] = np.linalg.solve(left_jacobian(offset[3:]), relative)
         offset[self._free] = slope[self._free] = 0.0
         self.jacobian = self._task.select(jacobian, rotation)
         law.approach(offset, slope, self._approach, OFFSET_STEP, self._offsets)
@@ -228,7 +228,7 @@ def resting(path: Path, t: Array) -> PathSamples:
     )
 
 
-def _left_jacobian(phi: Array) -> Array:
+def left_jacobian(phi: Array) -> Array:
     """Return Jl(φ), which takes φ̇ to the angular velocity of exp(φ), world axes."""
     return np.asarray(Jexp3(-phi))
 
@@ -240,11 +240,16 @@ class LastPath:
     ----------
     patience : float
         For how long that will do [s].
+
+    Attributes
+    ----------
+    path : Path or None
+        The last one without an error.
     """
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
-        self._path: Path | None = None
+        self.path: Path | None = None
         self._without = 0.0
 
     def samples(
@@ -252,21 +257,28 @@ class LastPath:
     ) -> PathSamples | None:
         """Return the path at times (K,); the last one where it fails, and add the reason.
 
-        Also the last one if none is given: targets have their own rate. None after too long:
-        `waited` [s] since the last call, and `age` [s] since the observation of a given target.
+        Also the last one if none is given: targets have their own rate, and chunks are known until
+        their last pose. None after too long: `waited` [s] since the last call, and `age` [s] since
+        the observation of a given target.
         """
         if path is not None:
             try:
                 found = resting(path, t)
-                self._path, self._without = path, age
+                self.path, self._without = path, age
                 return found
             # A path is the user's code: its exceptions must not leave the arm without a command.
             except Exception as error:
                 reasons.append(f"the path failed: {type(error).__name__}: {error}")
+        until = getattr(self.path, "until", None)
+        if path is None and self.path is not None and until is not None:
+            if t[0] <= until:
+                return resting(self.path, t)
+            reasons.append(f"the last chunk ended {t[0] - until:.3g} s ago")
+            return None
         self._without += waited
-        if self._path is not None and self._without <= self._patience:
-            return resting(self._path, t)
+        if self.path is not None and self._without <= self._patience:
+            return resting(self.path, t)
         if path is None:
             told = f"for {self._without:.3g} s (patience: {self._patience:.3g} s)"
-            reasons.append(f"there was no target {told if self._path else 'yet'}")
+            reasons.append(f"there was no target {told if self.path else 'yet'}")
         return None

@@ -27,11 +27,21 @@ from selfmotion.realtime.checks import (
     check_null_space,
     checked_state,
     checked_terms,
+    known_chunk,
     measured_state,
     observed_target,
 )
+from selfmotion.realtime.chunks import Chunk, joined
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.commands import Commands, Flag, Segment, joint_limits, planned_limits
+from selfmotion.realtime.commands import (
+    Commands,
+    Flag,
+    Segment,
+    cycles_of_mean,
+    joint_limits,
+    kept_envelope,
+    planned_limits,
+)
 from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.reference import Approach, LastPath, Reference
 from selfmotion.realtime.settings import AHEAD, SOON
@@ -45,8 +55,8 @@ class Replanner:
     velocity and acceleration. The measured deviation of the arm from its command is filtered, and
     the tool is planned for the arm's pose, so that the command compensates for it.
 
-    Limits of position, velocity and acceleration hold for every command, at all times and in all
-    events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
+    Limits of position, velocity, acceleration and jerk hold for every command, at all times and in
+    all events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
 
     Parameters
     ----------
@@ -56,8 +66,9 @@ class Replanner:
     costs : sequence of Cost
         By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
-        `JointPositionLimits`, `JointVelocityLimits` and `JointAccelerationLimits`, by default those
-        of the arm and its maker, and `Clearance`, whose obstacles may move.
+        `JointPositionLimits`, `JointVelocityLimits`, `JointAccelerationLimits`, `JointJerkLimits`
+        and `PositionDependentVelocityLimits`, by default those of the arm and its maker, and
+        `Clearance`, whose obstacles may move.
     horizon : float
         How far ahead is planned [s].
     null_motion : NullMotion
@@ -118,19 +129,22 @@ class Replanner:
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = checked_terms(follows, costs, constraints)
-        self.limits = limits = joint_limits(robot, constraints)
+        envelope = kept_envelope(robot, constraints)
+        limits = joint_limits(robot, envelope)
+        self.limits, self.jerk_limit = limits[:4], envelope.jerk
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
-        bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
-        self._around = Surroundings(robot, bodies) if bodies else None
+        self._around = Surroundings(robot, envelope.bodies) if envelope.bodies else None
         self._horizon = Horizon(
             follows, costs, planned_limits(limits), null_motion, self.horizon, steps, self._around
         )
         self._kinematics, self._layout = follows.only.chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
-        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
+        mean = cycles_of_mean(robot, envelope, self.cycle)
+        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling, mean)
         self._prepare()
-        self._reference = Reference(follows, approach or Approach(), self._times)
+        self._approach = approach or Approach()
+        self._reference = Reference(follows, self._approach, self._times)
         self._started = False
 
     def _prepare(self) -> None:
@@ -164,12 +178,15 @@ class Replanner:
         target: SE3 | npt.ArrayLike | None = None,
         twist: npt.ArrayLike | None = None,
         seen: float | None = None,
+        chunk: Sequence[SE3] | npt.ArrayLike | None = None,
+        times: npt.ArrayLike | None = None,
     ) -> Segment:
         """Return the motion to command from `t` on.
 
-        The task is a `path`, or a `target` as a camera sees it. A target may have its own rate:
-        without either, the last one continues, within the replanner's `patience`; then the arm is
-        brought to rest.
+        The task is a `path`, a `target` as a camera sees it, or a `chunk` of poses for the next
+        seconds, as a learned policy gives them. Targets and chunks may have their own rate: without
+        any, the last one continues: a target within the replanner's `patience`, a chunk up to its
+        last pose; then the arm is brought to rest.
 
         Parameters
         ----------
@@ -193,6 +210,13 @@ class Replanner:
         seen : float, optional
             When the target was seen, on the clock of `t` [s]; by default at `t`. One that was seen
             longer ago than `patience` is none, however often it is sent.
+        chunk : sequence of SE3, or (K, 4, 4), optional
+            Where the tool is to be at `times` [m], world axes. What was followed before holds until
+            the first of these, or `t`, and is then left for the chunk without a jump in
+            acceleration. One that is over, or has a number that is none, is left out, and
+            `Segment.reasons` says why; `Chunk.of` raises the same as an error.
+        times : (K,), optional
+            Of the chunk, on the clock of `t` [s], increasing.
 
         Returns
         -------
@@ -204,12 +228,15 @@ class Replanner:
         StartError
             The first state is not one from which the arm can stop within its limits.
         ProblemError
-            `t` lies before the last step, an obstacle is not known, or there are both a path and a
-            target.
+            `t` lies before the last step, an obstacle is not known, there are two of path, target
+            and chunk, or a chunk without times.
         """
         t, reasons = as_number(t, "t"), list[str]()
         if target is not None or twist is not None or seen is not None:
             path = observed_target(path, target, twist, t if seen is None else seen, reasons)
+        poses = None
+        if chunk is not None or times is not None:
+            poses = known_chunk(path, target, times, chunk, t, reasons)
         age = age_of_target(path, t)
         if abs(age) > self._patience:
             when = f"{age:.3g} s ago" if age > 0.0 else f"in {-age:.3g} s: on another clock?"
@@ -218,7 +245,7 @@ class Replanner:
             )
             path, age = None, 0.0
         with one_blas_thread():
-            return self._step(t, q, qd, path, max(age, 0.0), obstacles or {}, reasons)
+            return self._step(t, q, qd, poses or path, max(age, 0.0), obstacles or {}, reasons)
 
     def _step(
         self,
@@ -233,6 +260,8 @@ class Replanner:
         dof = self.robot.dof
         if not self._started:
             self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
+        if isinstance(path, Chunk):
+            path = joined(self._path.path, path, t, self._approach)
         q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)
@@ -240,7 +269,8 @@ class Replanner:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
         waited = max(passed, self.cycle)
-        target = self._path.samples(path, commands.time + self._times, waited, age, reasons)
+        ahead = commands.time + commands.lead + self._times
+        target = self._path.samples(path, ahead, waited, age, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:
@@ -252,8 +282,25 @@ class Replanner:
                 first = self._cycles
             else:
                 flag = Flag.STOPPING
+        issued = commands.segment(first, flag, tuple(reasons), follows, error)
+        unproved = self._unproved(issued)
+        if unproved:
+            # What was proved before runs to its rest.
+            reasons.append(unproved)
+            flag, follows = Flag.STOPPING, False
+            issued = commands.segment(None, flag, tuple(reasons), follows, error)
         self._follows = follows or flag is Flag.STOPPING
-        return commands.segment(first, flag, tuple(reasons), follows, error)
+        return issued
+
+    def _unproved(self, segment: Segment) -> str:
+        """Return why a segment is not proved to keep the arm clear of bodies; "" where it is.
+
+        Where the arm is expected: off its command as it is now.
+        """
+        if self._around is None:
+            return ""
+        q, times = segment.q + self._commands.deviation, segment.t - segment.t[0]
+        return self._around.unproved(q, segment.travelled, times)
 
     def _start(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)

@@ -17,6 +17,22 @@ FOLLOWED = 1e-3
 # Sampling interval of an offset of the tool [s].
 OFFSET_STEP = 2e-3
 
+# Longest time over which commands are averaged for limits of the jerk [s]: the tool leaves its path
+# by a 24th of its square times the acceleration, 0.2 mm at 10 m/s².
+LONGEST_MEAN = 0.02
+
+# --- chunks
+# Time in which the tool comes from rest before the first pose, and to rest after the last one [s].
+CHUNK_END = 0.2
+# Step of differences of twists, for accelerations at the ends of chunks [s].
+DIFFERENCE = 1e-4
+# Shortest time in which a chunk is joined [s] …
+JOIN_SHORTEST = 0.05
+# … factor to the next one that is tried …
+JOIN_FACTOR = 1.25
+# … and the longest [s].
+JOIN_LONGEST = 2.0
+
 # --- when it stops
 # Motions that break down within this time [s] are not followed: the arm stops in less.
 SOON = 0.5
@@ -73,3 +89,11 @@ CLEAR_FOR = 0.5
 LEAVING = 0.05
 # Decrease of a distance that counts as none [m].
 NEARER = 1e-4
+# Distance from which on pairs of meshes are far [m]: hulls always overlap there.
+FAR_MESHES = 0.03
+# Intervals of a segment on which its clearance is proved first …
+FIRST_CHECKS = 4
+# … of such pairs, which take a hundred times as long …
+FIRST_OF_MESHES = 1
+# … and largest number of configurations that are measured for it: they take time.
+MOST_CHECKS = 96

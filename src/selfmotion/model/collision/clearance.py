@@ -167,6 +167,26 @@ class ClearanceModel:
         item = next(item for item in self._exact.obstacles if item.name == obstacle)
         self._hulls.move(obstacle, place_of(item, pose, self.robot)[1])
 
+    @property
+    def pair_levers(self) -> Array:
+        """The pairs' lever arms, (P, n): see `CollisionModel.pair_levers`."""
+        return self._exact.pair_levers[self._of[self._selected]]
+
+    def displacement(self, obstacle: str, pose: SE3) -> float:
+        """Return by how much a point of a body on a link moves on it at most for a pose [m].
+
+        0 of obstacles in the world, which no joint moves.
+        """
+        item = next(item for item in self._exact.obstacles if item.name == obstacle)
+        if item.frame is None:
+            return 0.0
+        before, after = item.pose, pose
+        body = next(body for body in self._exact.every_body if body.name == obstacle)
+        size = np.maximum(np.abs(body.solid.low), np.abs(body.solid.high))
+        shift = float(np.linalg.norm(after.translation - before.translation))
+        turned = float(np.linalg.norm(after.rotation - before.rotation, ord=2))
+        return shift + turned * float(np.linalg.norm(size))
+
     def is_exact(self, column: int) -> bool:
         """Whether the bodies of a pair are their own convex hulls."""
         return self._exact.is_convex(int(self._of[self._selected[column]]))
@@ -174,8 +194,16 @@ class ClearanceModel:
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
         """Pairs of bodies without any piece here: the exact model alone checks them."""
+        return tuple(self._exact.pairs[k] for k in self._unselected)
+
+    def of_left_out(self) -> CollisionModel:
+        """Return the exact model of the pairs that are left out."""
+        return self._exact.of_pairs([tuple(self._exact.index[k]) for k in self._unselected])
+
+    @property
+    def _unselected(self) -> list[int]:
         selected = set(self._of[self._selected].tolist())
-        return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in selected)
+        return [k for k in range(len(self._exact.pairs)) if k not in selected]
 
     def _useful(self) -> Ints:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""

@@ -27,6 +27,7 @@ from selfmotion.model.robot.configurations import (
 )
 from selfmotion.model.robot.full_model import readable_visuals, reduced_geometry, stand_in
 from selfmotion.model.robot.named import home_of
+from selfmotion.model.robot.position_based import position_based_limits
 from selfmotion.model.robot.tree_arrays import Coupling, TreeArrays, tree_arrays
 from selfmotion.model.robot.urdf import Urdf
 from selfmotion.model.task import Task
@@ -194,6 +195,21 @@ class RobotModel:
             No joint belongs to a part of that name, nor has the name.
         """
         return part_weights(self, weights)
+
+    @cached_property
+    def position_based_limits(self) -> Array:
+        """Numbers of velocity limits that depend on the position, by its maker, (4, n).
+
+        Decelerations, offsets, and where the curves end below and above, of the elements
+        ``<position_based_velocity_limits>`` of the URDF, as libfranka reads them; ends are ±inf of
+        joints without. See `selfmotion.constraints.PositionDependentVelocityLimits`.
+
+        Raises
+        ------
+        RobotError
+            Such an element has a number that is none, or no ends.
+        """
+        return position_based_limits(self.urdf, self.joint_names, self.lower, self.upper)
 
     @property
     def home(self) -> Array:

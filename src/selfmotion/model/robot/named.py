@@ -26,8 +26,8 @@ class NamedArm:
     home : tuple of float or None
         Ready configuration of its maker [rad], if any.
     touching : tuple of (str, str)
-        Pairs of links whose meshes overlap in more than half of all configurations, by design; no
-        joint between them can separate them.
+        Pairs of links whose bodies overlap by design, in more than half of all configurations or as
+        their maker says; no joint between them can separate them.
     """
 
     urdf: str
@@ -45,6 +45,15 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         "panda_description/urdf/panda.urdf",
         "panda_hand_tcp",
         home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
+    ),
+    # Without a hand; capsules around the shoulder that its maker's semantic description leaves out
+    # of all checks (franka_description 1.0.1: link1, link3, "Never"). The ready configuration is
+    # that of libfranka's examples (examples_common.h).
+    "fr3": NamedArm(
+        "fr3.urdf",
+        "fr3_link8",
+        home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
+        touching=(("fr3_link1", "fr3_link3"),),
     ),
     # From UFACTORY's semantic description, which comes with the URDF. Its maker's home, all zeros,
     # is singular: no motion with a prescribed pose starts there.

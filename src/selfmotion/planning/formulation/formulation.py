@@ -314,6 +314,7 @@ class Formulation:
             jerk,
             own.bodies,
             (*(of_arm(item, n) for item in own.quantities), *several),
+            tuple(item.extended(virtual.dof - n) for item in own.curves),
         )
 
     def certify(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,12 +28,17 @@ from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Deadline, Search
 from selfmotion.planning.planner.run import plan, with_ending
 from selfmotion.planning.result import Plan, check_no_feed, rate_limits, retime
-from selfmotion.problem.constraints import Constraint, JointVelocityLimits
+from selfmotion.problem.constraints import Constraint, JointPositionLimits, JointVelocityLimits
 from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
 from selfmotion.problem.problem import Problem, check_problem
 
 # Default deadline [s].
 _FASTEST_DEADLINE = 60.0
+# Distance of joint paths from where limits of speed by position are 0 [rad or m]: joints of an FR3
+# may move at 0.1 rad/s there.
+_FROM_REST = 5e-3
+# Room beside a given start that is nearer [rad or m].
+_BESIDE_START = 1e-4
 # Rounds end at a relative gain below this …
 _ROUND_GAIN = 2e-3
 # … and after this number.
@@ -278,7 +283,8 @@ class _Rounds:
         geometric = (item for item in problem.constraints if not item.of_pace)
         # Limits of speed apply at the final pace, not at this one.
         any_speed = JointVelocityLimits(np.inf, replace=True)
-        self._free = replace(problem, constraints=(*geometric, any_speed))
+        places = _places_to_move(problem)
+        self._free = replace(problem, constraints=(*geometric, *places, any_speed))
         self.best: Plan | None = None
         self.verdict = "nothing was planned yet"
         self.times: list[float] = []
@@ -374,6 +380,21 @@ class _Rounds:
             if found.path.duration < self._duration and self._keeps(planned):
                 self.best = found
         return found
+
+
+def _places_to_move(problem: Problem) -> Iterator[JointPositionLimits]:
+    """Yield where joints may be for limits of speed by position to let them move at some pace.
+
+    At no pace does a joint go where its limit of speed is 0.
+    """
+    start = problem.given_start
+    for curves in problem.envelope.curves:
+        lower, upper = curves.resting[0] + _FROM_REST, curves.resting[1] - _FROM_REST
+        if start is not None:
+            # It stands where it stands.
+            lower = np.minimum(lower, start - _BESIDE_START)
+            upper = np.maximum(upper, start + _BESIDE_START)
+        yield JointPositionLimits(lower, upper)
 
 
 def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:

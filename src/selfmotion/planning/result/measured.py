@@ -10,7 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, read_only, shown
-from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement, deviation_from
+from selfmotion.certificate import (
+    Quantity,
+    QuantityWithinLimits,
+    Requirement,
+    VelocityByPosition,
+    deviation_from,
+)
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.model.robot import null_space
@@ -52,7 +58,8 @@ class LimitsUsed:
 
 def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
     """Return the quantities within limits that a slower pace may keep."""
-    selected = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
+    kinds = QuantityWithinLimits | VelocityByPosition
+    selected = (item.quantity for item in requirements if isinstance(item, kinds))
     return tuple(item for item in selected if item.of_pace and len(item.limited))
 
 

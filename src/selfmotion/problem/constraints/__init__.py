@@ -49,6 +49,9 @@ from selfmotion.problem.constraints.limits import (
     JointTorqueLimits as JointTorqueLimits,
     JointVelocityLimits as JointVelocityLimits,
 )
+from selfmotion.problem.constraints.position_dependent import (
+    PositionDependentVelocityLimits as PositionDependentVelocityLimits,
+)
 from selfmotion.problem.constraints.tool import Tilt as Tilt, ToolLimits as ToolLimits
 
 __all__ = [
@@ -71,6 +74,7 @@ __all__ = [
     "JointTorqueLimits",
     "JointVelocityLimits",
     "NodeTangents",
+    "PositionDependentVelocityLimits",
     "StartAcceleration",
     "StartVelocity",
     "Tilt",

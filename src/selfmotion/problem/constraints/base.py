@@ -10,7 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, Saved, read_only
-from selfmotion.certificate import JointLimits, Quantity, QuantityWithinLimits, Requirement
+from selfmotion.certificate import (
+    BrakingCurves,
+    JointLimits,
+    Quantity,
+    QuantityWithinLimits,
+    Requirement,
+)
 from selfmotion.model.collision import CollisionModel
 from selfmotion.model.follow import Follows
 from selfmotion.model.robot import RobotModel
@@ -32,6 +38,8 @@ class Envelope:
         Bodies with a minimum distance [m].
     quantities : tuple of Quantity
         Of q alone, with limits.
+    curves : tuple of BrakingCurves
+        Limits of q̇ that depend on q.
     """
 
     lower: Array
@@ -41,6 +49,7 @@ class Envelope:
     jerk: Array
     bodies: tuple[tuple[CollisionModel, float], ...] = ()
     quantities: tuple[Quantity, ...] = ()
+    curves: tuple[BrakingCurves, ...] = ()
 
     @classmethod
     def unbounded(cls, dof: int) -> Envelope:
@@ -65,6 +74,13 @@ class Envelope:
         """Return the envelope of a quantity of q alone, of n joints."""
         return replace(cls.unbounded(dof), quantities=(quantity,))
 
+    @classmethod
+    def of_curves(cls, curves: BrakingCurves) -> Envelope:
+        """Return the envelope of limits of q̇ that depend on q."""
+        lower, upper = curves.resting
+        own = cls.unbounded(len(lower))
+        return replace(own, lower=read_only(lower), upper=read_only(upper), curves=(curves,))
+
     def __and__(self, other: Envelope) -> Envelope:
         """Return the envelope that satisfies both."""
         return Envelope(
@@ -75,6 +91,7 @@ class Envelope:
             read_only(np.minimum(self.jerk, other.jerk)),
             (*self.bodies, *other.bodies),
             (*self.quantities, *other.quantities),
+            (*self.curves, *other.curves),
         )
 
     def admits(self, q: Array) -> npt.NDArray[np.bool_]:
@@ -98,6 +115,8 @@ class Envelope:
     def keeps(self, q: Array, qd: Array) -> Array:
         """Return the mask of q and q̇ (N, n) within the limits, bodies left out, (N,)."""
         inside = (q >= self.lower) & (q <= self.upper) & (np.abs(qd) <= self.speed)
+        for curves in self.curves:
+            inside &= (curves.excess(q, qd) <= 0.0).all(axis=0)
         return np.asarray(inside.all(axis=1))
 
 

@@ -192,6 +192,7 @@ class JointJerkLimits(_RateLimits):
     """
 
     order: ClassVar[int] = 3
+    kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-4

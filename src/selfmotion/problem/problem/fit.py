@@ -29,6 +29,7 @@ from selfmotion.problem.constraints import (
     JointJerkLimits,
     JointPositionLimits,
     JointVelocityLimits,
+    PositionDependentVelocityLimits,
     ToolLimits,
 )
 from selfmotion.problem.costs import Cost, JointVelocity
@@ -44,6 +45,7 @@ KEPT: tuple[Constraint, ...] = (
     JointVelocityLimits(),
     JointAccelerationLimits(),
     JointJerkLimits(),
+    PositionDependentVelocityLimits(),
 )
 # Stands for the usual cost of the problem's arm.
 USUAL_COSTS: tuple[Cost, ...] = (JointVelocity(),)

@@ -18,6 +18,7 @@ from selfmotion.problem.constraints import (
     JointAccelerationLimits,
     JointJerkLimits,
     JointVelocityLimits,
+    PositionDependentVelocityLimits,
     ToolLimits,
 )
 from selfmotion.problem.problem.fit import KEPT
@@ -116,9 +117,10 @@ def remarks_on(
         if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
             option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)
             kind = type(item).__name__
+            key = "deceleration" if isinstance(item, PositionDependentVelocityLimits) else "limit"
             yield (
                 f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
-                f'kept; give {option}in the file [[constraints]] kind = "{kind}", limit = …, in '
+                f'kept; give {option}in the file [[constraints]] kind = "{kind}", {key} = …, in '
                 f"Python {kind}(…)"
             )
     bodies = [body for item in requirements for body in item.obstacles]

@@ -40,7 +40,11 @@ def requirements(
     """
     asked: list[sm.constraints.Constraint] = []
     if usual:
-        makers = sm.constraints.JointAccelerationLimits, sm.constraints.JointJerkLimits
+        makers = (
+            sm.constraints.JointAccelerationLimits,
+            sm.constraints.JointJerkLimits,
+            sm.constraints.PositionDependentVelocityLimits,
+        )
         asked += [item for item in KEPT if isinstance(item, makers) and item.applies(robot)]
     if velocity is not None:
         most = options.one_or_each(velocity, "--velocity")

@@ -90,18 +90,15 @@ class Shell:
     def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
         held, arguments = options.locks(self.lock), options.arguments(self.argument)
-        # Loaded only where it decides what is meant.
-        planar = self.task is None and _is_planar(
-            sm.load_robot(
-                robot,
-                self.tool,
-                held,
-                reference=self.reference,
-                arguments=arguments,
-                packages=self.packages or (),
-            )
+        arm = sm.load_robot(
+            robot,
+            self.tool,
+            held,
+            reference=self.reference,
+            arguments=arguments,
+            packages=self.packages or (),
         )
-        task = self.task or ("planar" if planar else "pose")
+        task = self.task or ("planar" if _is_planar(arm) else "pose")
         normal = self.normal or ("z" if task.startswith("planar") else "x")
         table: dict[str, Any] = {
             "robot": {
@@ -112,7 +109,7 @@ class Shell:
             "start": self._start(warm_start),
             "path": self._path(normal),
             "costs": self._costs(),
-            "constraints": self._constraints(),
+            "constraints": self._constraints(arm),
             "relaxations": [_relaxation(text) for text in self.relax or []],
             "damping": self.damped,
             "clearance": not self.no_collision,
@@ -187,7 +184,7 @@ class Shell:
             costs.append({"kind": "InverseManipulability", "mu": self.mu})
         return costs
 
-    def _constraints(self) -> list[dict[str, Any]]:
+    def _constraints(self, arm: sm.RobotModel) -> list[dict[str, Any]]:
         speed: dict[str, Any] = {"kind": "JointVelocityLimits"}
         if self.velocity is not None:
             speed["limit"] = options.one_or_each(self.velocity, "--velocity")
@@ -196,6 +193,8 @@ class Shell:
             acceleration["limit"] = options.one_or_each(self.acceleration, "--acceleration")
         found: list[dict[str, Any]] = [{"kind": "JointPositionLimits"}, speed, acceleration]
         found.append({"kind": "JointJerkLimits"})
+        if sm.constraints.PositionDependentVelocityLimits().applies(arm):
+            found.append({"kind": "PositionDependentVelocityLimits"})
         if self.closed:
             found.append({"kind": "ClosedPath"})
         given = self.obstacles, self.srdf, self.disabled

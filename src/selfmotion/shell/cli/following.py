@@ -20,7 +20,6 @@ from selfmotion.basics import Array
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import reachable
-from selfmotion.problem.problem import KEPT, NO_OVERLAP
 
 # What `selfmotion follow` does: states of an arm come by UDP, and segments go back.
 
@@ -232,14 +231,8 @@ def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
         )
     if problem.damping is not None:
         raise sm.errors.ProblemError("while the arm moves nothing is damped: leave 'damping' out")
-    # Limits of the jerk that nobody wrote, as all problems have them by default, are left to plans.
-    asked = [
-        item
-        for item in problem.constraints
-        if item.kept_moving or not any(item is usual for usual in KEPT)
-    ]
-    if problem.clearance is not NO_OVERLAP and problem.clearance is not None:
-        asked.append(problem.clearance)
+    # With the default clearance, of the arm from itself.
+    asked = problem.all_constraints
     return sm.Replanner(problem.robot, problem.task, problem.costs, asked, **options)
 
 

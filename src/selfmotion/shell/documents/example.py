@@ -13,6 +13,7 @@ from selfmotion.model.collision import disabled_links, overlapping_by_design
 from selfmotion.model.path import Circle, Line, Path
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task
+from selfmotion.problem.constraints import PositionDependentVelocityLimits
 
 # Where the arm of an example begins: where it has room for the example's paths.
 
@@ -187,6 +188,10 @@ by_mm = [50, 0, 0]
 feed_mm = 50
 
 """
+_CURVES = """
+[[constraints]]        # slower towards the ends of joints, as the maker says
+kind = "PositionDependentVelocityLimits"
+"""
 _REST = """\
 [[costs]]              # what is to be low
 kind = "JointVelocity"
@@ -206,7 +211,7 @@ kind = "JointAccelerationLimits"  # those of the arm's maker, where known; or li
 
 [[constraints]]
 kind = "JointJerkLimits"
-
+{curves}
 # [[constraints]]
 # kind = "Clearance"
 # distance_mm = 10
@@ -311,6 +316,7 @@ def example_texts(
     apart = _clearance(arm, target, loaded, srdf, disabled, positioner) if clearance else _NONE
     given = _said_of_robot(robot, target, loaded, positioner) | {
         "tool": arm.tool,
+        "curves": _CURVES if PositionDependentVelocityLimits().applies(arm) else "",
         "link": f"arm/{arm.tool}" if positioner else arm.tool,
         "file": target.name,
         "command": "job" if job else "plan",

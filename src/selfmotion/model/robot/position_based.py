@@ -1,0 +1,69 @@
+"""Velocity limits that depend on the position of a joint, as the URDF of its maker gives them."""
+
+import math
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+import numpy as np
+
+from selfmotion.basics import Array, RobotError, read_only
+from selfmotion.model.robot.urdf import Urdf
+
+# The element and its attributes that libfranka reads (src/joint_velocity_limits.cpp of 0.21.2).
+_ELEMENT = "position_based_velocity_limits"
+_DECELERATION, _OFFSET = "deceleration_limit", "velocity_offset"
+
+
+def position_based_limits(urdf: Urdf, joints: Sequence[str], lower: Array, upper: Array) -> Array:
+    """Return decelerations, offsets, and the ends of the curves of joints, (4, n).
+
+    The ends are the attributes lower and upper of the element, else the limits (n,) of the joint,
+    as in libfranka. A joint without the element has the ends ±inf.
+
+    Raises
+    ------
+    RobotError
+        A number is none, or out of range.
+    """
+    found = np.array([np.ones(len(joints)), np.zeros(len(joints)), lower, upper])
+    found[2:] = np.array([[-np.inf], [np.inf]])
+    if _ELEMENT not in urdf.text:
+        return read_only(found)
+    elements = {
+        joint.get("name"): joint.find(_ELEMENT)
+        for joint in ElementTree.fromstring(urdf.text).iter("joint")
+    }
+    for k, name in enumerate(joints):
+        element = elements.get(name)
+        if element is None:
+            continue
+        where = f"{urdf.source}: joint '{name}': <{_ELEMENT}>"
+        ends = {"lower": float(lower[k]), "upper": float(upper[k])}
+        found[:, k] = [
+            _number(element, _DECELERATION, where),
+            _number(element, _OFFSET, where),
+            *(_number(element, end, where, usual) for end, usual in ends.items()),
+        ]
+        if not (found[0, k] > 0.0 and found[1, k] >= 0.0 and found[2, k] < found[3, k]):
+            raise RobotError(
+                f"{where} has {_DECELERATION} {found[0, k]:g}, {_OFFSET} {found[1, k]:g}, lower "
+                f"{found[2, k]:g} and upper {found[3, k]:g}; expected a deceleration above 0, an "
+                f"offset of 0 or more, and lower below upper"
+            )
+    return read_only(found)
+
+
+def _number(
+    element: ElementTree.Element, name: str, where: str, usual: float | None = None
+) -> float:
+    """Return an attribute as a finite number."""
+    text = element.get(name)
+    if text is None and usual is not None and math.isfinite(usual):
+        return usual
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RobotError(f"{where}: {name} is {text!r}, expected a finite number")
+    return value

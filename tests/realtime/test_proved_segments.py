@@ -1,0 +1,122 @@
+"""Segments end at rest and keep clear of bodies: proved before they are issued."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.model.collision import ClearanceModel
+from selfmotion.realtime import Flag
+from selfmotion.realtime.clear import Surroundings
+from support.arms import PANDA_HOME, robot_named
+from support.realtime_bodies import (
+    FAR,
+    PER_CYCLE,
+    ROUNDED,
+    SAME,
+    ball_at,
+    between_cycles,
+    changed_rests,
+    is_rest,
+    judged,
+    limits_exceeded,
+    looped,
+    run,
+)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_issued_keeps_its_distance_to_its_rest(seed: int) -> None:
+    replanner = looped()
+    found = run(replanner, seed)
+    assert max(judged(found)) <= 0.0
+    assert limits_exceeded(replanner, found) <= ROUNDED
+    # What is not proved is the rest of the one before: the same commands, a period later.
+    assert changed_rests(found) <= SAME
+    assert all(item.flag is Flag.STOPPING for item, _ in found if is_rest(item))
+
+
+def test_the_judges_of_segments_reject_what_is_broken() -> None:
+    replanner = looped()
+    found = run(replanner, 0)
+    segment, place = max(found, key=lambda each: np.ptp(each[0].q, axis=0).max())
+    faster = replace(segment, qd=50.0 * segment.qd)
+    assert limits_exceeded(replanner, [(faster, place)]) > 1.0
+    # A ball right ahead of where the tool comes to rest.
+    begins, ends = (robot_named("panda").pose(segment.q[k]).translation for k in (0, -1))
+    ahead = ends + 0.05 * (ends - begins) / np.linalg.norm(ends - begins)
+    assert max(judged([(segment, ahead)])) > 0.0
+    stale = replace(segment, q=segment.q + 1e-3, reasons=("not proved",))
+    assert changed_rests([(segment, place), (stale, place)]) > SAME
+
+
+@pytest.mark.parametrize("is_proved", [True, False])
+def test_the_proof_alone_stops_the_arm(monkeypatch: pytest.MonkeyPatch, *, is_proved: bool) -> None:
+    """Plans that see no body: with the proof no segment comes too near, without it some do."""
+
+    def none(self: Surroundings, samples: object, by_q: Array) -> tuple[Array, Array]:
+        self.blocked = False
+        return np.zeros((0, by_q.shape[2])), np.zeros(0)
+
+    monkeypatch.setattr(Surroundings, "rows", none)
+    if not is_proved:
+        monkeypatch.setattr(Surroundings, "unproved", lambda *_: "")
+    worst = max(max(judged(run(looped(), seed, 100))) for seed in range(4))
+    assert worst <= 0.0 if is_proved else worst > 0.0
+
+
+def test_path_lengths_are_bounds() -> None:
+    segment = run(looped(), 1, 12)[-1][0]
+    dense = between_cycles(segment)
+    lengths = np.cumsum(np.abs(np.diff(dense, axis=0)), axis=0)[PER_CYCLE - 1 :: PER_CYCLE]
+    bounds = segment.travelled[1 : len(lengths) + 1]
+    assert np.all(lengths <= bounds + 1e-12)
+    assert np.all(bounds[-1] <= 1.2 * lengths[-1] + 1e-3)
+
+
+def test_a_motion_through_a_body_between_cycles_is_not_proved(panda: sm.RobotModel) -> None:
+    """At the first and the last configuration all is far; only the bound between them tells."""
+    turns = np.stack([PANDA_HOME] * 3)
+    turns[:, 0] += [0.0, 0.6, 1.2]
+    ball = ball_at(panda.pose(turns[1]).translation, 0.02)
+    model = sm.obstacles.CollisionModel(panda, [ball])
+    around = Surroundings(panda, [(model, FAR)])
+    q, times = turns[[0, 2]], np.array([0.0, 1e-3])
+    assert min(model.distance(each).value for each in q) > FAR
+    travelled = np.stack([np.zeros(7), np.abs(q[1] - q[0])])
+    assert "not proved" in around.unproved(q, travelled, times)
+    assert around.unproved(q[[0, 0]], np.zeros((2, 7)), times) == ""
+    # A path length that is no number proves nothing.
+    assert "not proved" in around.unproved(q[[0, 0]], np.full((2, 7), np.nan), times)
+
+
+def test_pairs_whose_hulls_always_overlap_are_proved_by_their_meshes() -> None:
+    """Plans leave them out: without the proof nothing would keep them apart."""
+    robot = robot_named("ur5")
+    exact = sm.obstacles.CollisionModel(robot, ())
+    meshes = ClearanceModel(exact).of_left_out()
+    assert meshes.pairs
+    drawn = np.random.default_rng(0).uniform(-np.pi, np.pi, (60, 6))
+    each = np.array([meshes.distance(q).value for q in drawn])
+    away, near = drawn[int(np.argmax(each))], drawn[int(np.argmin(each))]
+    others = [pair for pair in exact.pairs if pair not in meshes.pairs]
+    alone = sm.obstacles.CollisionModel(robot, (), others)
+    around = Surroundings(robot, [(alone, 0.5 * float(each.max() + each.min()))])
+    times = np.array([0.0, 1.0])
+    assert around.unproved(np.stack([away, away]), np.zeros((2, 6)), times) == ""
+    travelled = np.stack([np.zeros(6), np.abs(near - away)])
+    assert "not proved" in around.unproved(np.stack([away, near]), travelled, times)
+
+
+def test_a_body_on_a_link_that_moves_there_lengthens_levers(panda: sm.RobotModel) -> None:
+    frame = "panda_hand_tcp"
+    torch = sm.obstacles.Cylinder("torch", np.zeros(3), 0.01, 0.2, frame=frame)
+    model = ClearanceModel(sm.obstacles.CollisionModel(panda, [torch]), 0.02)
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (500, 3)) * [0.01, 0.01, 0.1]
+    turn = pin.exp3(np.array([0.4, -0.2, 0.9]))
+    moved = pin.SE3(turn, np.array([0.02, 0.0, -0.05]))
+    most = max(float(np.linalg.norm(moved.act(point) - point)) for point in points)
+    assert most <= model.displacement("torch", moved) <= 3.0 * most
