@@ -127,6 +127,24 @@ def test_what_was_spoilt_is_planned_again(kept, tmp_path: Path, spoil) -> None:
     assert times == {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
 
 
+def test_what_does_not_apply_to_an_arm_is_not_missed(tmp_path: Path) -> None:
+    """Of an arm without published jerks, moves are kept as those of any other."""
+    ur5, ends = robot_named("ur5"), np.array([[0.3, 0.1], [0.4, 0.1], [0.4, -0.1], [0.3, -0.1]])
+    places = [(x, y, 0.3) for x, y in ends.tolist()]
+    seams = [
+        sm.Seam("one", line(*places[:2]), "pointing", either_way=False),
+        sm.Seam("two", line(*places[2:]), "pointing", either_way=False),
+    ]
+
+    def planned() -> dict[str, int]:
+        sm.plan_job(ur5, seams, folder=tmp_path, branches=1).require()
+        return {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("move*.npz")}
+
+    first = planned()
+    assert first
+    assert planned() == first
+
+
 def test_another_plan_of_the_same_problem_is_not_what_was_kept(kept, tmp_path: Path) -> None:
     """Two that begin elsewhere are both sound: only what was written with them tells them apart."""
     _, program = kept

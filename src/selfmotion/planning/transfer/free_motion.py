@@ -82,6 +82,13 @@ _END_CONFIGURATIONS = 16
 _ROUNDINGS = 16.0
 
 
+def constraints_of_moves(
+    robot: RobotModel, constraints: Sequence[Constraint]
+) -> tuple[Constraint, ...]:
+    """Return what a move of an arm keeps: conditions at all times, of those that apply to it."""
+    return tuple(item for item in at_all_times(constraints) if item.applies(robot))
+
+
 class FreeMotions:
     """Finds motions of an arm between configurations.
 
@@ -101,11 +108,7 @@ class FreeMotions:
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> None:
-        retained = at_all_times(constraints)
-        self.robot, self.constraints = (
-            robot,
-            tuple(item for item in retained if item.applies(robot)),
-        )
+        self.robot, self.constraints = robot, constraints_of_moves(robot, constraints)
         self._rng, self._progress = rng, progress
         self.envelope: Envelope = envelope_of(robot, self.constraints)
 

@@ -30,7 +30,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import branches, from_start, like_before, near_start
 from selfmotion.planning.result import ArmCache, Move, Plan, load_move, load_plan
-from selfmotion.planning.transfer import FreeMotions
+from selfmotion.planning.transfer import FreeMotions, constraints_of_moves
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import (
@@ -346,7 +346,7 @@ def _move_here(task: _Task) -> Move:
 
 def _missing(task: _Task, trouble: str) -> Move:
     robot, constraints = task["arm"]
-    return Move(robot, tuple(constraints), None, trouble)
+    return Move(robot, constraints_of_moves(robot, constraints), None, trouble)
 
 
 def _plans_asked(task: _Task) -> dict[str, Any]:
