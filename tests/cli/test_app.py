@@ -4,6 +4,7 @@ import io
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -321,15 +322,19 @@ def open_nothing() -> io.StringIO:
         (("plan", "nosuch", "--circle", "0.1"), {"class": "RobotError", "file": None}),
         (("plan", "panda", "--circle", "0.1", "--nosuch"), {"class": "NoSuchOption"}),
         (("plan", "ur5", "--circle", "0.1"), {"class": "RedundancyError", "dof": 6, "rows": 6}),
+        (("plan", "my file.toml"), {"file": "my file.toml", "key": "path"}),
+        (("plan",), {"class": "MissingParameter"}),
     ],
 )
 def test_of_bad_input_a_program_sees_json(
     tmp_path: Path, arguments: tuple[str, ...], expected: dict[str, object]
 ) -> None:
     (tmp_path / "bad.toml").write_text('[robot]\nname = "panda"\n[path]\nfle = "x.csv"\n')
+    shutil.copy(tmp_path / "bad.toml", tmp_path / "my file.toml")
     (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0.3,0,0.5\n1,0.3,zero,0.5\n")
     result = run(*arguments, "--json", cwd=tmp_path)
     assert result.returncode == 2, result.stderr
     error = json.loads(result.stdout)["error"]
     assert error | expected == error
+    assert error["message"]
     assert error["message"] in result.stderr

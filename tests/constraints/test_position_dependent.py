@@ -185,3 +185,12 @@ def test_plans_and_files_keep_the_numbers(panda: sm.RobotModel, tmp_path: Path) 
     sm.files.write_problem(problem, tmp_path / "cell.toml")
     again = sm.read_problem(tmp_path / "cell.toml").constraints[0]
     assert (again.deceleration, again.offset, again.margin) == (4.0, 0.1, limits.margin)
+
+
+def test_other_elements_name_joints_too() -> None:
+    """Of controls and transmissions, which descriptions of ROS have beside the joints."""
+    robot = robot_named("fr3")
+    name = robot.joint_names[0]
+    more = f'<ros2_control name="arm"><joint name="{name}"/></ros2_control></robot>'
+    found = sm.load_robot(robot.urdf.text.replace("</robot>", more), tool=robot.tool)
+    np.testing.assert_array_equal(found.position_based_limits, robot.position_based_limits)

@@ -82,3 +82,15 @@ def test_smallest_eigenvector(m: int, equal: int) -> None:
     assert value == pytest.approx(values[0], abs=ALGEBRA)
     assert np.linalg.norm(vector) == pytest.approx(1.0, abs=ALGEBRA)
     np.testing.assert_allclose(a @ vector, value * vector, atol=ALGEBRA)
+
+
+def test_determinants_are_those_of_numpy() -> None:
+    rng = np.random.default_rng(4)
+    jacobians = rng.normal(size=(6, 3, 5))
+    jacobians[4, 2] = jacobians[4, 0] + jacobians[4, 1]
+    jacobians[5, 0, 0] = np.nan
+    found = algebra.gram_determinants(jacobians)
+    expected = np.linalg.det(jacobians[:4] @ np.swapaxes(jacobians[:4], 1, 2))
+    np.testing.assert_allclose(found[:4], expected, rtol=1e-10)
+    assert found[4] == 0.0
+    assert np.isnan(found[5])

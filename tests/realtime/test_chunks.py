@@ -1,5 +1,7 @@
 """Chunks of poses: joined without a jump, followed to the micrometre, and stopped when over."""
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -265,3 +267,54 @@ def test_one_thing_is_asked_for_at_a_step(panda: sm.RobotModel) -> None:
     late = Replanner(panda).step(5.0, *first[1:], chunk=poses, times=times)
     assert "it ended 4 s ago" in late.reasons[0]
     assert late.flag is Flag.STOPPING
+
+
+def test_a_chunk_is_not_joined_to_what_nobody_follows(panda: sm.RobotModel) -> None:
+    """Told to stay where it rests, long after a target was lost, the tool stays."""
+    replanner, pose = Replanner(panda, "pose"), panda.pose(PANDA_HOME)
+    t, q, qd = 0.0, PANDA_HOME, np.zeros(7)
+
+    def go(**given: Any) -> None:
+        nonlocal t, q, qd
+        segment = replanner.step(t, q, qd, **given)
+        t += replanner.period
+        n = segment.index(t)
+        q, qd = segment.q[n], segment.qd[n]
+
+    for _ in range(10):
+        go(target=pose, twist=[0.0, 0.2, 0.0, 0.0, 0.0, 0.0], seen=t)
+    for _ in range(150):
+        go()
+    here = panda.pose(q)
+    go(chunk=[here] * 5, times=t + 0.1 * np.arange(5))
+    for _ in range(30):
+        go()
+        assert np.linalg.norm(panda.pose(q).translation - here.translation) < 1e-9
+
+
+def test_what_fails_leaves_no_arm_without_a_segment(panda: sm.RobotModel) -> None:
+    pose = panda.pose(PANDA_HOME)
+
+    class Live(sm.paths.Dwell):
+        lost = False
+
+        def evaluate(self, t: np.ndarray) -> sm.paths.PathSamples:
+            if self.lost:
+                raise RuntimeError("camera")
+            return super().evaluate(t)
+
+    far = pose.copy()
+    far.translation = np.array([1e308, 0.0, 0.0])
+    for given in (
+        {},
+        {"chunk": [pose] * 2, "times": [0.0, 1.0]},
+        {"chunk": [pose, far, pose], "times": [0.0, 0.1, 0.2]},
+    ):
+        live, replanner = Live(pose, 9.0), Replanner(panda, "pose")
+        replanner.step(0.0, PANDA_HOME, np.zeros(7), live)
+        live.lost = True
+        with np.errstate(all="ignore"):
+            asked = given or {"path": live}
+            segment = replanner.step(0.01, PANDA_HOME, np.zeros(7), **asked)
+        assert segment.reasons
+        assert np.isfinite(segment.q).all()

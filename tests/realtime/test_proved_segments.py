@@ -10,7 +10,8 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.collision import ClearanceModel
 from selfmotion.realtime import Flag
-from selfmotion.realtime.clear import Surroundings
+from selfmotion.realtime.clear import Surroundings, _Proof
+from selfmotion.realtime.settings import NEARER
 from support.arms import PANDA_HOME, robot_named
 from support.realtime_bodies import (
     FAR,
@@ -120,3 +121,20 @@ def test_a_body_on_a_link_that_moves_there_lengthens_levers(panda: sm.RobotModel
     moved = pin.SE3(turn, np.array([0.02, 0.0, -0.05]))
     most = max(float(np.linalg.norm(moved.act(point) - point)) for point in points)
     assert most <= model.displacement("torch", moved) <= 3.0 * most
+
+
+def test_what_one_segment_may_give_away_is_not_given_away_again() -> None:
+    """Segment after segment, each to where it may go: however many, no nearer than by that once."""
+    pairs = ("link", "ball"), ("link", "post")
+    proof = _Proof(lambda q, asked: q, pairs, FAR, np.ones((2, 1)), 4, remembers=False)
+    now = np.array([FAR + 0.5 * NEARER, 0.4 * FAR])
+    for _ in range(200):
+        now = proof.required(now)
+    np.testing.assert_allclose(now, [FAR - NEARER, 0.4 * FAR - NEARER], rtol=0.0, atol=1e-12)
+    # What has got away has to stay away.
+    assert proof.required(np.array([FAR, 0.8 * FAR]))[1] == pytest.approx(0.8 * FAR - NEARER)
+    # Of an arm that was pushed nearer, or a body that was told to be: nearer no more, or anew.
+    pushed = proof.required(np.array([FAR - 1.5 * NEARER, 0.1 * FAR]))
+    np.testing.assert_allclose(pushed, [FAR - 1.5 * NEARER, 0.1 * FAR - NEARER])
+    proof.forget(["ball"])
+    assert proof.required(np.array([0.5 * FAR, FAR]))[0] == pytest.approx(0.5 * FAR - NEARER)

@@ -1,6 +1,7 @@
 """Joints that mimic others: one coordinate in kinematics, derivatives, dynamics and bodies."""
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from selfmotion.certificate import path_error
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.robot import Dynamics, Energy, ToolRates
 from selfmotion.model.robot.tree_arrays import JOINT
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper.minimum_norm import FixedStart
 from support.arms import Case, central_difference, objective_of, short_line
 from support.files_of_people import finger, torso
@@ -266,3 +268,22 @@ def test_coupled_arms_plan_save_export_and_replay(robot: sm.RobotModel, tmp_path
     assert sm.files.read_motion(tmp_path / "plan.csv").joint_names == robot.joint_names
     poses = robot.joint_poses(plan.trajectory.q[[0, -1]])
     assert poses.shape[1] == robot.model.nv
+
+
+def test_what_is_computed_of_a_chain_has_room_for_all_its_joints(robot: sm.RobotModel) -> None:
+    """More joints than coordinates: with tolerances, and towards what is out of reach."""
+    start = robot.dexterous_configuration("position")
+    path = sm.paths.Line(robot.pose(start), robot.pose(start + 0.02), 1.0)
+    problem = sm.Problem(
+        robot, path, "position", start, constraints=(), rest=False, clearance=None,
+        relaxations=[sm.Relaxation("z", 0.01)],
+    )  # fmt: skip
+    relaxed = Formulation.of(problem).follows
+    q = np.append(start, 0.0)
+    tip = relaxed.items[0].chain.place(q)
+    np.testing.assert_allclose(tip.homogeneous, robot.pose(start).homogeneous, atol=EXACT)
+    assert sm.plan(problem).certificate.verified
+    away = robot.pose(start)
+    away.translation = away.translation + np.array([9.0, 0.0, 0.0])
+    with pytest.raises(sm.SelfmotionError):
+        sm.plan(replace(problem, path=sm.paths.Dwell(away, 1.0), start=None, relaxations=()))

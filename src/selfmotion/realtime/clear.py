@@ -1,6 +1,6 @@
 """Clearance from obstacles that move."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -59,7 +59,10 @@ class Surroundings:
                         f"that of '{obstacle}' always contains '{link}': close its mesh, which is "
                         f"then taken apart, or give its parts as obstacles of their own"
                     )
-        self._proofs = [proof for model, far in self._models for proof in _proofs_of(model, far)]
+        # Of each model that of its hulls comes first, and may be followed by that of meshes.
+        each = [list(_proofs_of(model, far)) for model, far in self._models]
+        self._proofs = [proof for proofs in each for proof in proofs]
+        self._of_hulls = [proofs[0] for proofs in each]
         # By how much bodies on links are displaced from where they were at first [m].
         self._displaced: dict[str, float] = {}
         self.blocked, self.message = False, ""
@@ -79,6 +82,13 @@ class Surroundings:
                     self._check_moves(model, name)
                     model.move(name, there)
                     self._displaced[name] = model.displacement(name, there)
+        for proof in self._proofs:
+            proof.forget(obstacles)
+
+    def forget(self) -> None:
+        """Forget how near bodies have been: the arm is somewhere else."""
+        for proof in self._proofs:
+            proof.forget()
 
     def _check_moves(self, model: ClearanceModel, name: str) -> None:
         """Raise ProblemError for a body on a link of which some distance is that of meshes."""
@@ -102,8 +112,10 @@ class Surroundings:
         """
         self.blocked, self.message = False, ""
         found = [
-            self._rows(model, far, standing, samples, by_q)
-            for (model, far), standing in zip(self._models, self._standing, strict=True)
+            self._rows(model, proof, standing, samples, by_q)
+            for (model, _), proof, standing in zip(
+                self._models, self._of_hulls, self._standing, strict=True
+            )
         ]
         rows, room = zip(*found, strict=True)
         return np.concatenate(rows), np.concatenate(room)
@@ -111,18 +123,18 @@ class Surroundings:
     def _rows(
         self,
         model: ClearanceModel,
-        distance: float,
+        proof: "_Proof",
         standing: frozenset[str],
         samples: Samples,
         by_q: Array,
     ) -> tuple[Array, Array]:
         """Return the rows of one model."""
-        nodes = samples.nodes
+        nodes, distance = samples.nodes, proof.far
         found = model.clearances(samples.q[nodes])
         values = found.values
         times = samples.sampling.node_times
         soon = values[times <= CLEAR_FOR]
-        allowed = np.minimum(distance, soon[0] - NEARER) if soon.size else soon
+        allowed = proof.required(soon[0]) if soon.size else soon
         if (soon[1:] < allowed).any():
             row, pair = np.argwhere(soon[1:] < allowed)[0]
             first, second = model.pairs[pair]
@@ -144,7 +156,9 @@ class Surroundings:
     def unproved(self, q: Array, travelled: Array, times: Array) -> str:
         """Return why a motion is not proved to keep the distances; "" where it is.
 
-        Of each pair the distance, or what it has at the start if that is less. Between two
+        Of each pair the distance, or where it has been nearer all the time the largest one that it
+        has had, but for `NEARER`: what one segment may give away is not given away by the next one
+        again. Between two
         configurations the distance d of a pair changes by Σ_j l_j V_j at most, with V_j the path
         length of joint j and l_j the pair's lever arm, so that d ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in
         between (`certificate.separation`). Intervals on which that does not decide are halved.
@@ -206,6 +220,26 @@ class _Proof:
         self._measure, self._first, self._remembers = measure, first, remembers
         # Of each pair the last distance that was measured, and where.
         self._known, self._where = np.full(len(pairs), -np.inf), np.zeros_like(levers)
+        # The largest distance that each pair has had, at most the one to keep.
+        self._floor = np.full(len(pairs), -np.inf)
+
+    def forget(self, names: Collection[str] | None = None) -> None:
+        """Forget how near pairs have been: of all, or of those with one of some obstacles."""
+        for k, pair in enumerate(self.pairs):
+            if names is None or not set(names).isdisjoint(pair):
+                self._floor[k] = -np.inf
+
+    def required(self, now: Array) -> Array:
+        """Return the distances (P,) that pairs have to keep which have these now.
+
+        Bounds need some room to prove that a pair beside its distance leaves it. One that is nearer
+        than that allows, as when the arm was pushed, comes no nearer; much nearer, it begins anew.
+        """
+        pushed = now < self._floor - 2.0 * NEARER
+        before = np.where(pushed, -np.inf, self._floor)
+        self._floor = np.maximum(before, np.minimum(self.far, now))
+        kept = np.where(now >= self.far + NEARER, self.far, self._floor - NEARER)
+        return np.asarray(np.minimum(kept, now))
 
     def undecided(self, levers: Array, q: Array, travelled: Array) -> tuple[int, int, float] | None:
         """Return a cycle, the pair and its distance there, where no bound decides; None for all."""
@@ -227,7 +261,7 @@ class _Proof:
             # Meshes that are nearer all the time would take a hundred measurements: these are only
             # measured at the ends.
             bounded = asked & (values[0] >= self.far)
-        need = np.minimum(self.far, values[0] - NEARER)
+        need = self.required(values[0])
         counted = np.where(bounded[:, None], levers, 0.0)
         return _bisected(measured, edges, values, need, travelled, counted)
 

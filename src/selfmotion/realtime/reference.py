@@ -262,23 +262,39 @@ class LastPath:
         the observation of a given target.
         """
         if path is not None:
-            try:
-                found = resting(path, t)
+            found = _tried(path, t, reasons)
+            if found is not None:
                 self.path, self._without = path, age
                 return found
-            # A path is the user's code: its exceptions must not leave the arm without a command.
-            except Exception as error:
-                reasons.append(f"the path failed: {type(error).__name__}: {error}")
         until = getattr(self.path, "until", None)
         if path is None and self.path is not None and until is not None:
             if t[0] <= until:
-                return resting(self.path, t)
+                return _tried(self.path, t, reasons)
             reasons.append(f"the last chunk ended {t[0] - until:.3g} s ago")
             return None
         self._without += waited
         if self.path is not None and self._without <= self._patience:
-            return resting(self.path, t)
+            found = None if self.path is path else _tried(self.path, t, reasons)
+            if found is not None:
+                return found
         if path is None:
             told = f"for {self._without:.3g} s (patience: {self._patience:.3g} s)"
             reasons.append(f"there was no target {told if self.path else 'yet'}")
+        return None
+
+    @property
+    def followed(self) -> Path | None:
+        """The last path, while it is followed: None after too long without one."""
+        return self.path if self._without <= self._patience else None
+
+
+def _tried(path: Path, t: Array, reasons: list[str]) -> PathSamples | None:
+    """Return a path at times (K,); None where it fails, with the reason.
+
+    A path is the user's code: its exceptions must not leave the arm without a command.
+    """
+    try:
+        return resting(path, t)
+    except Exception as error:
+        reasons.append(f"the path failed: {type(error).__name__}: {error}")
         return None

@@ -261,7 +261,7 @@ class Replanner:
         if not self._started:
             self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
         if isinstance(path, Chunk):
-            path = joined(self._path.path, path, t, self._approach)
+            path = self._joined(path, t, reasons)
         q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)
@@ -292,6 +292,17 @@ class Replanner:
         self._follows = follows or flag is Flag.STOPPING
         return issued
 
+    def _joined(self, chunk: Chunk, t: float, reasons: list[str]) -> Path:
+        """Return a chunk joined to what is followed; alone where that fails, with the reason.
+
+        Both may be anything: their exceptions must not leave the arm without a command.
+        """
+        try:
+            return joined(self._path.followed, chunk, t, self._approach)
+        except Exception as error:
+            reasons.append(f"the chunk is not joined: {type(error).__name__}: {error}")
+            return chunk
+
     def _unproved(self, segment: Segment) -> str:
         """Return why a segment is not proved to keep the arm clear of bodies; "" where it is.
 
@@ -307,6 +318,8 @@ class Replanner:
         self._path = LastPath(self._patience)
         self._without_state = self._without_motion = 0.0
         self._horizon.forget()
+        if self._around is not None:
+            self._around.forget()
         self._follows = self._started = True
 
     def _held_up(self, passed: float) -> Array | None:

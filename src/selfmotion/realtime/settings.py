@@ -87,7 +87,7 @@ LEVEL = 0.01
 CLEAR_FOR = 0.5
 # Speed of leaving a violated distance [m/s].
 LEAVING = 0.05
-# Decrease of a distance that counts as none [m].
+# What a distance may fall short of by, in all [m]: room for bounds of pairs that are beside it.
 NEARER = 1e-4
 # Distance from which on pairs of meshes are far [m]: hulls always overlap there.
 FAR_MESHES = 0.03

@@ -131,7 +131,8 @@ class TableKinematics(Kinematics):
 @kernel
 def _place(q: Array, table: Array, jacobian: Array, rotation: Array, translation: Array) -> None:
     """Set where a tip is, (1, 3, 3) and (1, 3), and its Jacobian (1, 6, n), at q (n,)."""
-    r, p = np.empty((len(q) + 1, 3, 3)), np.empty((len(q) + 1, 3))
+    # Of all joints on the chain: those that mimic others share a coordinate.
+    r, p = np.empty((table.shape[1], 3, 3)), np.empty((table.shape[1], 3))
     place_tips(q, table, r, p, rotation, translation, jacobian)
 
 

@@ -132,12 +132,17 @@ def solve_cholesky(factor: Array, b: Array) -> None:
 
 @kernel
 def gram_determinants(jacobians: Array) -> Array:
-    """Return det JJᵀ of matrices J (S, m, n), (S,); 0 where JJᵀ is singular to rounding."""
+    """Return det JJᵀ of matrices J (S, m, n), (S,); 0 where it is singular to rounding, or NaN."""
     count, m, _ = jacobians.shape
     found, factor = np.zeros(count), np.empty((m, m))
     for s in range(count):
         gram(jacobians[s], factor)
-        if cholesky(factor):
+        trace = 0.0
+        for i in range(m):
+            trace += factor[i, i]
+        if not isfinite(trace):
+            found[s] = np.nan
+        elif cholesky(factor):
             root = 1.0
             for i in range(m):
                 root *= factor[i, i]

@@ -31,7 +31,8 @@ def position_based_limits(urdf: Urdf, joints: Sequence[str], lower: Array, upper
         return read_only(found)
     elements = {
         joint.get("name"): joint.find(_ELEMENT)
-        for joint in ElementTree.fromstring(urdf.text).iter("joint")
+        # Of the robot alone: controls and transmissions name joints, too.
+        for joint in ElementTree.fromstring(urdf.text).findall("joint")
     }
     for k, name in enumerate(joints):
         element = elements.get(name)

@@ -256,8 +256,13 @@ class Judge:
     def _check_speeds(self, local: LocalMotion) -> None:
         """Note where no speed of the self-motion keeps all joints within their limits of speed."""
         envelope, labels = self.formulation.envelope, self.formulation.coordinates.label
-        limit = envelope.speed * (1.0 + _SPEED_ROUNDING) + ROUNDING
-        lower, upper = speed_range(local.rates, local.null, limit)
+        least, most = np.broadcast_to(-envelope.speed, local.z.shape), envelope.speed
+        for curves in envelope.curves:
+            below, above = curves.velocities(local.z)
+            least, most = np.maximum(least, below), np.minimum(most, above)
+        share = 1.0 + _SPEED_ROUNDING
+        limits = share * least - ROUNDING, share * most + ROUNDING
+        lower, upper = speed_range(local.rates, local.null, *limits)
         first, last = np.argmax(lower, axis=1), np.argmin(upper, axis=1)
         every = np.arange(len(local.z))
         conflict = self._open & (lower[every, first] > upper[every, last])
@@ -267,15 +272,15 @@ class Judge:
             self._note(here, Reason.SPEED, f"{names} too fast, whatever the self-motion")
 
 
-def speed_range(rates: Array, null: Array, limit: Array) -> tuple[Array, Array]:
-    """Return the ranges of speeds s of the self-motion with |a + s b| ≤ v for each joint.
+def speed_range(rates: Array, null: Array, least: Array, most: Array) -> tuple[Array, Array]:
+    """Return the ranges of speeds s of the self-motion with v₁ ≤ a + s b ≤ v₂ for each joint.
 
     Parameters
     ----------
     rates, null : (K, n)
         a and b.
-    limit : (n,)
-        v; inf for none.
+    least, most : (K, n) or (n,)
+        v₁ and v₂; ∓inf for none.
 
     Returns
     -------
@@ -284,9 +289,9 @@ def speed_range(rates: Array, null: Array, limit: Array) -> tuple[Array, Array]:
     """
     moves = np.abs(null) > _STANDS
     safe = np.where(moves, null, 1.0)
-    ends = np.stack([(-limit - rates) / safe, (limit - rates) / safe])
+    ends = np.stack([(least - rates) / safe, (most - rates) / safe])
     lower, upper = ends.min(axis=0), ends.max(axis=0)
-    fast = np.abs(rates) > limit
+    fast = (rates > most) | (rates < least)
     stands = np.where(fast, np.inf, -np.inf)
     return np.where(moves, lower, stands), np.where(moves, upper, -stands)
 

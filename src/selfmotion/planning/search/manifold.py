@@ -167,7 +167,7 @@ def approach_all(
     is NaN.
     """
     n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians, error, step = np.zeros((tips, 6, n)), np.empty(m), np.empty(m)
     jacobian, factor, steep = np.empty((m, n)), np.empty((m, m)), np.empty((m, n))

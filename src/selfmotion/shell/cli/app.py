@@ -302,7 +302,7 @@ def main() -> None:
         code = BAD_INPUT
     except typer.TyperException as error:
         # Of arguments and options themselves; it says so on its own where nothing is JSON.
-        _fail(error, str(error), as_json)
+        _fail(error, error.format_message(), as_json)
         code = BAD_INPUT
     except Exception as error:
         # Not bad input, and no verdict: whoever reads exit codes must not take it for one.
@@ -324,7 +324,7 @@ def _fail(error: Exception, text: str, as_json: bool) -> None:
 
 # How messages begin: with the file, then the key of a document, or a line or row of it.
 _PLACE = re.compile(
-    r"(?P<file>[^\s:]*[^\s:/]\.[A-Za-z]\w*): "
+    r"(?P<file>[^:\n]*[^\s:/]\.[A-Za-z]\w*): "
     r"(?:(?:line|row) (?P<line>\d+)\b|(?P<key>[A-Za-z_][\w.\[\]-]*): )?"
 )
 
@@ -340,7 +340,7 @@ def error_json(error: Exception, text: str) -> dict[str, Any]:
     if place["line"] is not None:
         place["line"] = int(place["line"])
     data = {"class": type(error).__name__, "message": text, **place}
-    return {"error": data | {k: v for k, v in vars(error).items() if isinstance(v, _PLAIN)}}
+    return {"error": {k: v for k, v in vars(error).items() if isinstance(v, _PLAIN)} | data}
 
 
 # Attributes of errors that JSON has.
