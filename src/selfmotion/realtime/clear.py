@@ -59,10 +59,7 @@ class Surroundings:
                         f"that of '{obstacle}' always contains '{link}': close its mesh, which is "
                         f"then taken apart, or give its parts as obstacles of their own"
                     )
-        # Of each model that of its hulls comes first, and may be followed by that of meshes.
-        each = [list(_proofs_of(model, far)) for model, far in self._models]
-        self._proofs = [proof for proofs in each for proof in proofs]
-        self._of_hulls = [proofs[0] for proofs in each]
+        self._proofs = [proof for model, far in self._models for proof in _proofs_of(model, far)]
         # By how much bodies on links are displaced from where they were at first [m].
         self._displaced: dict[str, float] = {}
         self.blocked, self.message = False, ""
@@ -112,10 +109,8 @@ class Surroundings:
         """
         self.blocked, self.message = False, ""
         found = [
-            self._rows(model, proof, standing, samples, by_q)
-            for (model, _), proof, standing in zip(
-                self._models, self._of_hulls, self._standing, strict=True
-            )
+            self._rows(model, far, standing, samples, by_q)
+            for (model, far), standing in zip(self._models, self._standing, strict=True)
         ]
         rows, room = zip(*found, strict=True)
         return np.concatenate(rows), np.concatenate(room)
@@ -123,18 +118,19 @@ class Surroundings:
     def _rows(
         self,
         model: ClearanceModel,
-        proof: "_Proof",
+        distance: float,
         standing: frozenset[str],
         samples: Samples,
         by_q: Array,
     ) -> tuple[Array, Array]:
         """Return the rows of one model."""
-        nodes, distance = samples.nodes, proof.far
+        nodes = samples.nodes
         found = model.clearances(samples.q[nodes])
         values = found.values
         times = samples.sampling.node_times
         soon = values[times <= CLEAR_FOR]
-        allowed = proof.required(soon[0]) if soon.size else soon
+        # What is given away by one plan after another, the proof refuses.
+        allowed = np.minimum(distance, soon[0] - NEARER) if soon.size else soon
         if (soon[1:] < allowed).any():
             row, pair = np.argwhere(soon[1:] < allowed)[0]
             first, second = model.pairs[pair]
