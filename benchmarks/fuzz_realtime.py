@@ -16,7 +16,7 @@ import selfmotion as sm
 from selfmotion.realtime import Replanner
 from support import realtime_bodies as bodies, realtime_scenarios as scenarios
 
-# One scenario of so many has a ball that jumps about the tool's way.
+# One scenario in this number has a ball that jumps about the tool's way.
 EVERY = 5
 TASKS = ("pose", "position", "pointing")
 FAR = {"horizon": 8.0, "null_motion": sm.motion.BSplineNullMotion(6), "steps": 24}

@@ -138,3 +138,20 @@ def test_what_one_segment_may_give_away_is_not_given_away_again() -> None:
     np.testing.assert_allclose(pushed, [FAR - 1.5 * NEARER, 0.1 * FAR - NEARER])
     proof.forget(["ball"])
     assert proof.required(np.array([0.5 * FAR, FAR]))[0] == pytest.approx(0.5 * FAR - NEARER)
+
+
+def test_a_body_that_is_told_again_where_it_is_gives_nothing_away(panda: sm.RobotModel) -> None:
+    """As cameras do at each step: only one that moved has another distance to keep."""
+    ball = ball_at(panda.pose(PANDA_HOME).translation + np.array([0.2, 0.0, 0.0]), 0.02)
+    around = Surroundings(panda, [(sm.obstacles.CollisionModel(panda, [ball]), FAR)])
+    place = ball.pose
+    around.move({"ball": place})
+    (proof,) = around._proofs
+    which = [k for k, pair in enumerate(proof.pairs) if "ball" in pair]
+    now = np.full(len(proof.pairs), 0.5 * FAR)
+    first = proof.required(now)
+    around.move({"ball": place.homogeneous})
+    np.testing.assert_array_equal(proof.required(first), np.minimum(first, proof.required(now)))
+    assert np.all(proof.required(first) >= first)
+    around.move({"ball": pin.SE3(np.eye(3), place.translation + np.array([0.0, 1e-3, 0.0]))})
+    assert np.all(proof.required(first)[which] < first[which])

@@ -15,7 +15,7 @@ from support.arms import PANDA_HOME, robot_named
 Found = list[tuple[Segment, Array]]
 # Distance to keep [m].
 FAR = 0.01
-# Between control cycles segments are judged at so many times: 4 kHz.
+# Between control cycles segments are judged at this number of times: 4 kHz.
 PER_CYCLE = 4
 # Rounding of distances of bodies [m].
 ROUNDING = 1e-6

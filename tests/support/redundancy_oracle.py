@@ -274,7 +274,7 @@ class Oracle:
         return self._solved(i, self.shown.coordinate, self.starts)
 
     def _solved(self, i: int, values: Array, starts: int) -> list[Array]:
-        """Return the solutions at values (V,) of the coordinate from so many random starts."""
+        """Return the solutions at values (V,) of the coordinate from `starts` random ones."""
         robot = self.problem.robot
         lower, upper = robot.finite_limits()
         q = self._rng.uniform(lower, upper, (len(values) * starts, robot.dof))

@@ -134,6 +134,17 @@ def of_chebyshev(coefficients: Array, share: Array) -> Array:
     return found
 
 
+@cache
+def bernstein(degree: int) -> Array:
+    """Return the matrix from coefficients of 1, s, s² … on 0 ≤ s ≤ 1 to control points.
+
+    The points of degree m, (m + 1, m + 1): their hull contains the polynomial (G. Farin, Curves and
+    Surfaces for CAGD, 5th ed. 2002, ch. 5). The first columns are of a lower degree, elevated.
+    """
+    size = degree + 1
+    return np.array([[comb(i, k) / comb(degree, k) for k in range(size)] for i in range(size)])
+
+
 def recentred(coefficients: Array, middle: Array, half: Array) -> Array:
     """Return the coefficients of p(middle + half · u); both broadcast with one coefficient."""
     found = np.zeros(

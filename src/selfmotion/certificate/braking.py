@@ -18,13 +18,11 @@ no control point above 0, the upper limit is kept whatever q is. The lower one i
 """
 
 from dataclasses import dataclass
-from functools import cache
-from math import comb
 
 import numpy as np
 from typing_extensions import override
 
-from selfmotion.basics import Array, Flags, ProblemError, read_only
+from selfmotion.basics import Array, Flags, ProblemError, read_only, series
 from selfmotion.certificate.bounding import halves
 from selfmotion.certificate.quantity import Column, Quantity
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement, of_some
@@ -218,9 +216,11 @@ class VelocityByPosition(Requirement):
         """Return on which intervals (I, 2) both limits of all joints are kept for certain, (I,)."""
         half = 0.5 * (intervals[:, 1] - intervals[:, 0])
         table = motion.polynomials(intervals.mean(axis=1), half)
+        # Of s from 0 to 1, in place of u from -1 to 1.
+        table = series.recentred(table, np.full((1, 1), -1.0), np.full((1, 1), 2.0))
         degree = len(table) - 1
-        rates = table[1:] * np.arange(1.0, degree + 1.0)[:, None, None] / half[None, :, None]
-        into = _control_points(degree)
+        rates = table[1:] * np.arange(1.0, degree + 1.0)[:, None, None] / (2.0 * half[:, None])
+        into = series.bernstein(degree)
         q = np.tensordot(into, table, 1)
         qd = np.tensordot(into[:, :degree], rates, 1)
         excess = self.curves.excess(q, qd).max(axis=1)
@@ -268,16 +268,3 @@ class VelocityByPosition(Requirement):
         if 1.0 < factor < np.inf:
             text += f": give it {factor:.5g} times the duration"
         return Finding(self.name, name, time, share, 1.0, kept, text, True, factor)
-
-
-@cache
-def _control_points(degree: int) -> Array:
-    """Return the matrix from coefficients of powers of u, -1 to 1, to Bernstein's of a degree.
-
-    Of a polynomial of a lower degree the first columns are those of its elevated control points.
-    """
-    u = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    s, k = 0.5 * (1.0 + u)[:, None], np.arange(degree + 1)
-    binomials = np.array([comb(degree, int(j)) for j in k], dtype=np.float64)
-    bernstein = binomials * s**k * (1.0 - s) ** (degree - k)
-    return np.asarray(np.linalg.solve(bernstein, np.vander(u, degree + 1, increasing=True)))

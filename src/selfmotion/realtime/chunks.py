@@ -11,6 +11,7 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_numbers, read_only, restore, shown
+from selfmotion.model.motion import differentiated, evaluated, hermite
 from selfmotion.model.path import Path, PathSamples, Waypoints, path_pose
 from selfmotion.model.task import SE3, exp3, log3, turning
 from selfmotion.realtime.reference import Approach, left_jacobian, resting
@@ -228,13 +229,12 @@ def quintic(offset: Array, window: float, tau: Array) -> tuple[Array, Array]:
     0 after `window`; before τ = 0 that at 0.
     """
     u = np.clip(tau / window, 0.0, 1.0)[:, None]
-    x, v, a = offset[0], window * offset[1], 0.5 * window**2 * offset[2]
-    c = (x, v, a, -10.0 * x - 6.0 * v - 3.0 * a, 15.0 * x + 8.0 * v + 3.0 * a,
-         -6.0 * x - 3.0 * v - a)  # fmt: skip
-    way = sum(part * u**k for k, part in enumerate(c))
-    slope = sum(k * part * u ** (k - 1) for k, part in enumerate(c) if k)
+    coefficients = hermite(
+        np.full((1, 1), window), *((row[None], 0.0 * row[None]) for row in offset)
+    )
+    way, slope = (evaluated(each, u) for each in (coefficients, differentiated(coefficients)))
     inside = (tau >= 0.0) & (tau <= window)
-    return np.asarray(way), np.asarray(slope) * inside[:, None] / window
+    return way, slope * inside[:, None] / window
 
 
 def joined(last: Path | None, chunk: Chunk, now: float, approach: Approach) -> Path:

@@ -62,25 +62,33 @@ class Surroundings:
         self._proofs = [proof for model, far in self._models for proof in _proofs_of(model, far)]
         # By how much bodies on links are displaced from where they were at first [m].
         self._displaced: dict[str, float] = {}
+        # Where bodies were told to be last.
+        self._told: dict[str, SE3] = {}
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, SE3]) -> None:
         """Put obstacles somewhere else: name → pose in world axes, or in the frame of its link."""
         known = sorted(set().union(*self._names))
+        moved = set[str]()
         for name, pose in obstacles.items():
             if name not in known:
                 hint = nearest(name, known)
                 raise ProblemError(
                     f"obstacle '{name}' is none of the clearance's: {', '.join(known)}{hint}"
                 )
+            there = as_pose(pose, f"obstacle '{name}'")
+            # What stays where it is gives nothing of its distance away again.
+            if name in self._told and self._told[name] == there:
+                continue
             for (model, _), names in zip(self._models, self._names, strict=True):
                 if name in names:
-                    there = as_pose(pose, f"obstacle '{name}'")
                     self._check_moves(model, name)
                     model.move(name, there)
                     self._displaced[name] = model.displacement(name, there)
+            self._told[name] = there.copy()
+            moved.add(name)
         for proof in self._proofs:
-            proof.forget(obstacles)
+            proof.forget(moved)
 
     def forget(self) -> None:
         """Forget how near bodies have been: the arm is somewhere else."""
@@ -154,10 +162,10 @@ class Surroundings:
 
         Of each pair the distance, or where it has been nearer all the time the largest one that it
         has had, but for `NEARER`: what one segment may give away is not given away by the next one
-        again. Between two
-        configurations the distance d of a pair changes by Σ_j l_j V_j at most, with V_j the path
-        length of joint j and l_j the pair's lever arm, so that d ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in
-        between (`certificate.separation`). Intervals on which that does not decide are halved.
+        again. Between two configurations the distance d of a pair changes by Σ_j l_j V_j at most,
+        with V_j the path length of joint j and l_j the pair's lever arm, so that d ≥ ½ (d(a) + d(b)
+        - Σ_j l_j V_j) in between (`certificate.separation`). Intervals on which that does not
+        decide are halved.
 
         Parameters
         ----------

@@ -115,7 +115,7 @@ def cycles_of_mean(robot: RobotModel, envelope: Envelope, cycle: float) -> int:
     Raises
     ------
     ProblemError
-        A mean over so many cycles would no longer be the motion that was planned.
+        A mean over that many cycles would no longer be the motion that was planned.
     """
     needed = np.ceil(2.0 * envelope.acceleration / (envelope.jerk * cycle) * (1.0 - _ROUNDING))
     worst = int(np.argmax(needed))

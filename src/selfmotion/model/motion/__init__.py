@@ -11,6 +11,11 @@ from selfmotion.model.motion.null_motion import (
     fading_window as fading_window,
     resting_window as resting_window,
 )
+from selfmotion.model.motion.spline import (
+    differentiated as differentiated,
+    evaluated as evaluated,
+    hermite as hermite,
+)
 from selfmotion.model.motion.trajectory import (
     MOST_SAMPLES as MOST_SAMPLES,
     Evaluation as Evaluation,

@@ -5,13 +5,12 @@ p(s) = Σ c_k s^k on 0 ≤ s ≤ 1, coefficients (m + 1, …) lowest first.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache, cached_property
-from math import comb
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Ints, series
 
 # Relative size below which a leading coefficient counts as zero.
 _NOTHING = 1e-13
@@ -47,7 +46,7 @@ def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[n
     A polynomial lies in the hull of its Bernstein coefficients, the first and last of which are
     its ends.
     """
-    inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
+    inner = np.tensordot(series.bernstein(len(coefficients) - 1)[1:-1], coefficients, 1)
     if not len(inner):
         return np.zeros(coefficients.shape[1:], dtype=bool)
     return np.asarray((inner.max(axis=0) > largest) | (inner.min(axis=0) < least))
@@ -55,8 +54,7 @@ def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[n
 
 def may_vanish(coefficients: Array) -> npt.NDArray[np.bool_]:
     """Return the mask of polynomials (m + 1, …) that may have a root: not those of one sign."""
-    inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
-    hull = np.concatenate([coefficients[:1], inner, coefficients.sum(axis=0, keepdims=True)])
+    hull = np.tensordot(series.bernstein(len(coefficients) - 1), coefficients, 1)
     return np.asarray((hull.max(axis=0) >= 0.0) & (hull.min(axis=0) <= 0.0))
 
 
@@ -103,15 +101,6 @@ def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
     companion[:, 1:, :-1] = np.eye(degree - 1)
     companion[:, :, -1] = -monic[:-1].T
     return np.asarray(np.linalg.eigvals(companion).T)
-
-
-@cache
-def _bernstein(degree: int) -> Array:
-    """Return the matrix from coefficients to the inner Bernstein coefficients, (m - 1, m + 1)."""
-    rows = range(1, degree)
-    return np.array(
-        [[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in rows]
-    ).reshape(-1, degree + 1)
 
 
 def hermite(h: Array, *given: tuple[Array, Array]) -> Array:

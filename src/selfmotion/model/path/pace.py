@@ -2,8 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
-from math import comb
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -98,7 +97,7 @@ class Pace:
         degree = len(coefficients) - 1
         powers = np.arange(degree + 1.0)
         local = coefficients * (powers + 1.0)[:, None] * h ** powers[:, None]
-        points = _bernstein(degree) @ local
+        points = series.bernstein(degree) @ local
         allowed = _FALL * max(float(np.max(self.rate)), self.sigma[-1] / self.t[-1])
         late = np.flatnonzero(points.min(axis=0) < -allowed)
         if not len(late):
@@ -135,13 +134,6 @@ class Pace:
             10.0 * rise - 4.0 * gain + surge,
         )
         return PPoly(np.stack([*higher, start, self.rate[:-1], self.sigma[:-1]]), self.t)
-
-
-@cache
-def _bernstein(degree: int) -> Array:
-    """Return the matrix from coefficients of 1, u, u² … on 0 ≤ u ≤ 1 to control points."""
-    size = degree + 1
-    return np.array([[comb(j, k) / comb(degree, k) for k in range(size)] for j in range(size)])
 
 
 def _times_along(places: Array, rates: Array) -> Array:

@@ -17,6 +17,7 @@ from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
 from selfmotion.basics.layout import COUNT, FIRST, KIND, ORDER, POINTING, ROWS, Layout
 from selfmotion.model.kernels import (
     Every,
+    Stage,
     Tip,
     approach,
     cholesky,
@@ -119,38 +120,36 @@ def retract(
         _set_tangents(tangents[k], system, factor, b)
         if centred:
             _centre(tangents[k], stage_of(table[k], n, m).epsilon, b)
-        placed = rotations, positions, jacobians
-        if not _follows(here, system, factor, layout, placed, table[k]):
+        at = stage_of(table[k], n, m)
+        _set_rows(at, system, factor)
+        if not evaluate_motion(here, table[k], layout, rotations, positions, jacobians):
             failed = k if failed < 0 else failed
     return failed
 
 
 @inlined
-def _follows(
-    q: Array,
-    system: Array,
-    factor: Array,
-    layout: Layout,
-    placed: tuple[Array, Array, Array],
-    row: Array,
-) -> bool:
-    """Set the row of a node at q (n,) on its manifold, with its q̇; return whether q̇ is finite.
-
-    The first rows of B, and of the factor of BBᵀ, are those of J and of JJᵀ. `placed` are the
-    rotations, positions and Jacobians of all tips.
-    """
-    n, m = len(q), rows_of(layout)
-    at = stage_of(row, n, m)
-    for j in range(n):
-        at.q[j] = q[j]
+def _set_rows(at: Stage, system: Array, factor: Array) -> None:
+    """Set J and the factor of JJᵀ: the first rows of B, and of the factor of BBᵀ."""
+    m, n = at.task_jacobian.shape
     for i in range(m):
         for j in range(n):
             at.task_jacobian[i, j] = system[i, j]
         for j in range(i + 1):
             at.factor[i, j] = factor[i, j]
+
+
+@inlined
+def evaluate_motion(
+    q: Array, row: Array, layout: Layout, rotations: Array, positions: Array, jacobians: Array
+) -> bool:
+    """Set q, all tips and q̇ of a row whose J, factor of JJᵀ and ε are set; whether q̇ is finite."""
+    n, m = len(q), rows_of(layout)
+    at = stage_of(row, n, m)
+    for j in range(n):
+        at.q[j] = q[j]
     for f in range(layout.shape[0]):
         tip = tip_of(row, f, n, m)
-        write_tip(tip, placed[0][f], placed[1][f], placed[2][f])
+        _write_tip(tip, rotations[f], positions[f], jacobians[f])
         select(layout, f, tip.rotation, tip.command, at.y)
     respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
     return finite(at.qd)
@@ -211,7 +210,7 @@ def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
 
 
 @inlined
-def write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
+def _write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
     """Write a tip's pose and Jacobian into the table; its command is its path's twist."""
     for i in range(3):
         tip.translation[i] = place[i]
@@ -278,13 +277,13 @@ def acceleration_slopes(
     every: Every | None,
     s: int,
     rates: Array,
-    follows: bool,
+    with_path: bool,
     six: Array,
     out: Array,
 ) -> None:
     """Set `out` (m, n) to ∂b/∂q̇ at q̇ = `rates`; `six` is work space.
 
-    Without the paths' own motion, unless `follows`: then b is -S J̇q̇, and this is linear in q̇. Of
+    Without the paths' own motion, unless `with_path`: b is then -S J̇q̇, and this is linear in q̇. Of
     joint k of a chain, with v_k and ω_k its columns and sums over the joints before and behind it,
 
         ∂(J̇q̇)/∂q̇_k = [2 (Σ_{i≤k} q̇_i ω_i × v_k + ω_k × Σ_{i>k} q̇_i v_i);
@@ -296,7 +295,7 @@ def acceleration_slopes(
             out[i, j] = 0.0
     for f in range(layout.shape[0]):
         tip, none = tip_of(row, f, n, m), (0.0, 0.0, 0.0)
-        turns = follows and layout[f, KIND] == POINTING
+        turns = with_path and layout[f, KIND] == POINTING
         target = angular_part(tip.target_twist) if turns else none
         if every is None:
             _add_slopes(

@@ -24,9 +24,7 @@ from selfmotion.model.kernels import (
     cholesky,
     clear_held,
     columns,
-    finite,
     gram,
-    respond,
     rows_of,
     select,
     solve_cholesky,
@@ -40,10 +38,10 @@ from selfmotion.planning.nodes.charts import Charts, Place
 from selfmotion.planning.nodes.kernels import (
     accelerate,
     acceleration_slopes,
+    evaluate_motion,
     project,
     required_acceleration,
     turned,
-    write_tip,
 )
 
 # Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
@@ -293,17 +291,13 @@ def _place(
     place_tips(q, chains, work.turns, work.places, work.rotations, work.positions, work.jacobians)
     clear_held(held, work.jacobians)
     for f in range(layout.shape[0]):
-        tip = tip_of(work.row, f, n, m)
-        write_tip(tip, work.rotations[f], work.positions[f], work.jacobians[f])
-        task_rows(layout, f, tip.rotation, tip.jacobian, at.task_jacobian)
-        select(layout, f, tip.rotation, tip.command, at.y)
+        task_rows(layout, f, work.rotations[f], work.jacobians[f], at.task_jacobian)
     gram(at.task_jacobian, at.factor)
     if not cholesky(at.factor):
         return False
     for j in range(n):
-        at.q[j], at.epsilon[j] = q[j], epsilon[j]
-    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
-    return finite(at.qd)
+        at.epsilon[j] = epsilon[j]
+    return evaluate_motion(q, work.row, layout, work.rotations, work.positions, work.jacobians)
 
 
 @called

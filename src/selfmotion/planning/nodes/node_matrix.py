@@ -68,7 +68,7 @@ class NodeMatrix(NamedTuple):
 
     @classmethod
     def zeros(cls, count: int, size: int) -> Self:
-        """Return the matrix 0 of so many nodes, with so many coordinates each."""
+        """Return the matrix 0 for `count` nodes with `size` coordinates each."""
         return cls(np.zeros((count, size, size)), np.zeros((count - 1, size, size)))
 
     def copy(self) -> Self:

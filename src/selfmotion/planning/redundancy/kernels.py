@@ -12,6 +12,7 @@ from selfmotion.model.kernels import (
     rows_of,
     solve_cholesky,
 )
+from selfmotion.model.kernels.algebra import Vector, cross, dot, plus
 from selfmotion.model.robot import place_tips
 from selfmotion.model.robot.tree_arrays import AXIS, JOINT
 
@@ -59,6 +60,16 @@ def _turn(target: Array, rotation: Array, jacobian: Array, slope: Array) -> floa
     return float(np.arctan2(about, along))
 
 
+@inlined
+def _vector(a: Array) -> Vector:
+    return a[0], a[1], a[2]
+
+
+@inlined
+def _scaled(s: float, a: Vector) -> Vector:
+    return s * a[0], s * a[1], s * a[2]
+
+
 @called
 def _swivel(code: Ints, reference: Array, chain: Array, r: Array, p: Array, slope: Array) -> float:
     """Return the `SwivelAngle` of the elbow, and set its slope (n,); NaN for a straight arm.
@@ -66,64 +77,35 @@ def _swivel(code: Ints, reference: Array, chain: Array, r: Array, p: Array, slop
     With e from the shoulder to the elbow, u the unit vector to the wrist, and the reference a:
     θ = atan2(e·(u × a), e·a - (e·u)(u·a)).
     """
-    shoulder, elbow, wrist = p[code[1]], p[code[2]], p[code[3]]
-    u, e, across = np.empty(3), np.empty(3), np.empty(3)
-    axis, du, de = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(3):
-        u[i], e[i] = wrist[i] - shoulder[i], elbow[i] - shoulder[i]
-    length = np.sqrt(_dot(u, u))
-    for i in range(3):
-        u[i] /= length
-    _cross(u, reference, across)
-    eu, au, ea = _dot(e, u), _dot(reference, u), _dot(e, reference)
-    y, x = _dot(e, across), ea - eu * au
+    shoulder, elbow, wrist = _vector(p[code[1]]), _vector(p[code[2]]), _vector(p[code[3]])
+    a, e, line = _vector(reference), plus(elbow, -1.0, shoulder), plus(wrist, -1.0, shoulder)
+    length = np.sqrt(dot(line, line))
+    u = _scaled(1.0 / length, line)
+    across, eu, au = cross(u, a), dot(e, u), dot(a, u)
+    y, x = dot(e, across), dot(e, a) - eu * au
     square = x * x + y * y
     if not square > _STRAIGHT**2:
         return np.nan
     for k in range(len(slope)):
         slope[k] = 0.0
     for j in range(code[3] - 1):
-        for i in range(3):
-            axis[i] = du[i] = de[i] = 0.0
-            for b in range(3):
-                axis[i] += r[j + 1, i, b] * chain[j, AXIS, b] * chain[j, JOINT, 2]
-        _add_velocity(1.0, axis, p[j + 1], wrist, du)
+        axis, origin = (0.0, 0.0, 0.0), _vector(p[j + 1])
+        for b in range(3):
+            column = r[j + 1, 0, b], r[j + 1, 1, b], r[j + 1, 2, b]
+            axis = plus(axis, chain[j, AXIS, b] * chain[j, JOINT, 2], column)
+        # Velocities of the wrist and of the elbow from the shoulder, by this joint.
+        du, de = cross(axis, plus(wrist, -1.0, origin)), (0.0, 0.0, 0.0)
         if j < code[2] - 1:
-            _add_velocity(1.0, axis, p[j + 1], elbow, de)
+            de = cross(axis, plus(elbow, -1.0, origin))
         if j < code[1] - 1:
-            _add_velocity(-1.0, axis, p[j + 1], shoulder, du)
-            _add_velocity(-1.0, axis, p[j + 1], shoulder, de)
+            of_shoulder = cross(axis, plus(shoulder, -1.0, origin))
+            du, de = plus(du, -1.0, of_shoulder), plus(de, -1.0, of_shoulder)
         # du = (I - uuᵀ) d(wrist - shoulder) / |wrist - shoulder|.
-        along = _dot(du, u)
-        for i in range(3):
-            du[i] = (du[i] - along * u[i]) / length
-        dy, dx = _dot(de, across), _dot(de, reference) - (_dot(de, u) + _dot(e, du)) * au
-        dx -= eu * _dot(reference, du)
-        _cross(du, reference, de)
-        dy += _dot(e, de)
+        du = _scaled(1.0 / length, plus(du, -dot(du, u), u))
+        dx = dot(de, a) - (dot(de, u) + dot(e, du)) * au - eu * dot(a, du)
+        dy = dot(de, across) + dot(e, cross(du, a))
         slope[int(chain[j, JOINT, 0])] += (x * dy - y * dx) / square
     return float(np.arctan2(y, x))
-
-
-@called
-def _add_velocity(sign: float, axis: Array, origin: Array, point: Array, out: Array) -> None:
-    """Add the velocity of a point by a turn about an axis to `out` (3,), times a sign."""
-    x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    out[0] += sign * (axis[1] * z - axis[2] * y)
-    out[1] += sign * (axis[2] * x - axis[0] * z)
-    out[2] += sign * (axis[0] * y - axis[1] * x)
-
-
-@called
-def _cross(a: Array, b: Array, out: Array) -> None:
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@called
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @called

@@ -15,8 +15,9 @@ function shade(colors, share) {
   return colors[k].map((value, i) => value + (place - k) * (colors[k + 1][i] - value));
 }
 
-class RedundancyMap {
+class RedundancyMap extends Figure {
   constructor(parent, data, onSeek, onStand) {
+    super();
     Object.assign(this, data);
     this.onSeek = onSeek;
     this.onStand = onStand;
@@ -37,14 +38,7 @@ class RedundancyMap {
     this.svg.addEventListener("pointermove", (event) => (event.buttons & 1 ? stand : look)(event));
     this.svg.addEventListener("pointerdown", stand);
     this.svg.addEventListener("pointerleave", () => { this.hover = undefined; this.tell(); });
-    this.observer = new ResizeObserver(() => this.draw());
-    this.observer.observe(this.figure);
-    this.draw();
-  }
-
-  remove() {
-    this.observer.disconnect();
-    this.figure.remove();
+    this.drawAtEachSize();
   }
 
   // A pixel of the canvas for each of the map, the highest value at the top.

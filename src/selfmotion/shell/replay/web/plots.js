@@ -30,9 +30,24 @@ function ticks(low, high, count) {
   return places;
 }
 
+// A figure that draws itself again where its size changes, until it is removed.
+class Figure {
+  drawAtEachSize() {
+    this.observer = new ResizeObserver(() => this.draw());
+    this.observer.observe(this.figure);
+    this.draw();
+  }
+
+  remove() {
+    this.observer.disconnect();
+    this.figure.remove();
+  }
+}
+
 // spec: { title, unit, note, t, log, floor, events: [{ t, name, color }], curves: [{ name, values, color, start, low, high }] }
-class Plot {
+class Plot extends Figure {
   constructor(parent, spec, onSeek) {
+    super();
     Object.assign(this, spec);
     this.time = 0;
     this.chosen = null;
@@ -50,14 +65,7 @@ class Plot {
     });
     this.svg.addEventListener("pointerdown", (event) => onSeek(this.timeAt(event)));
     this.svg.addEventListener("pointerleave", () => { this.hover = undefined; this.update(); });
-    this.observer = new ResizeObserver(() => this.draw());
-    this.observer.observe(this.figure);
-    this.draw();
-  }
-
-  remove() {
-    this.observer.disconnect();
-    this.figure.remove();
+    this.drawAtEachSize();
   }
 
   // One entry per curve with its value; where curves have limits, a button that singles one out.
