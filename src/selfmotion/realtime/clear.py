@@ -1,6 +1,6 @@
 """Clearance from obstacles that move."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -62,14 +62,19 @@ class Surroundings:
         self._proofs = [proof for model, far in self._models for proof in _proofs_of(model, far)]
         # By how much bodies on links are displaced from where they were at first [m].
         self._displaced: dict[str, float] = {}
-        # Where bodies were told to be last.
-        self._told: dict[str, SE3] = {}
         self.blocked, self.message = False, ""
 
-    def move(self, obstacles: Mapping[str, SE3]) -> None:
-        """Put obstacles somewhere else: name → pose in world axes, or in the frame of its link."""
+    def move(self, obstacles: Mapping[str, SE3], q: Array) -> None:
+        """Put obstacles somewhere else: name → pose in world axes, or in the frame of its link.
+
+        What pairs have to keep changes by what that changes of their distances at q (n,), where
+        the arm is. Poses that jitter, as those of cameras do, give nothing away so.
+        """
+        if not obstacles:
+            return
+        moving = [proof for proof in self._proofs if not proof.remembers]
+        before = [proof.distances(q) for proof in moving]
         known = sorted(set().union(*self._names))
-        moved = set[str]()
         for name, pose in obstacles.items():
             if name not in known:
                 hint = nearest(name, known)
@@ -77,18 +82,13 @@ class Surroundings:
                     f"obstacle '{name}' is none of the clearance's: {', '.join(known)}{hint}"
                 )
             there = as_pose(pose, f"obstacle '{name}'")
-            # What stays where it is gives nothing of its distance away again.
-            if name in self._told and self._told[name] == there:
-                continue
             for (model, _), names in zip(self._models, self._names, strict=True):
                 if name in names:
                     self._check_moves(model, name)
                     model.move(name, there)
                     self._displaced[name] = model.displacement(name, there)
-            self._told[name] = there.copy()
-            moved.add(name)
-        for proof in self._proofs:
-            proof.forget(moved)
+        for proof, was in zip(moving, before, strict=True):
+            proof.bodies_moved(proof.distances(q) - was)
 
     def forget(self) -> None:
         """Forget how near bodies have been: the arm is somewhere else."""
@@ -221,17 +221,24 @@ class _Proof:
         remembers: bool,
     ) -> None:
         self.pairs, self.far, self.levers = pairs, far, levers
-        self._measure, self._first, self._remembers = measure, first, remembers
+        self.remembers = remembers
+        self._measure, self._first = measure, first
         # Of each pair the last distance that was measured, and where.
         self._known, self._where = np.full(len(pairs), -np.inf), np.zeros_like(levers)
         # The largest distance that each pair has had, at most the one to keep.
         self._floor = np.full(len(pairs), -np.inf)
 
-    def forget(self, names: Collection[str] | None = None) -> None:
-        """Forget how near pairs have been: of all, or of those with one of some obstacles."""
-        for k, pair in enumerate(self.pairs):
-            if names is None or not set(names).isdisjoint(pair):
-                self._floor[k] = -np.inf
+    def forget(self) -> None:
+        """Forget how near pairs have been."""
+        self._floor[:] = -np.inf
+
+    def distances(self, q: Array) -> Array:
+        """Return the distances of pairs at a configuration (n,), (P,) [m]."""
+        return np.asarray(self._measure(q[None], np.ones(len(self.pairs), dtype=np.bool_))[0])
+
+    def bodies_moved(self, change: Array) -> None:
+        """Take in by how much bodies have changed distances, (P,) [m], where the arm is."""
+        self._floor = np.minimum(self._floor + change, self.far)
 
     def required(self, now: Array) -> Array:
         """Return the distances (P,) that pairs have to keep which have these now.
@@ -260,7 +267,7 @@ class _Proof:
         edges = np.unique(edges)
         values = measured(edges)
         bounded = asked
-        if self._remembers:
+        if self.remembers:
             self._known[asked], self._where[asked] = values[0, asked], q[0]
             # Meshes that are nearer all the time would take a hundred measurements: these are only
             # measured at the ends.

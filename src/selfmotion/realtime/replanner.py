@@ -265,9 +265,9 @@ class Replanner:
         q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)
-        if self._around is not None:
-            self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
+        if self._around is not None:
+            self._around.move(obstacles, commands.place)
         waited = max(passed, self.cycle)
         ahead = commands.time + commands.lead + self._times
         target = self._path.samples(path, ahead, waited, age, reasons)
