@@ -1,5 +1,6 @@
 """Velocity limits that depend on the position: the maker's, kept and proved at all times."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -162,11 +163,29 @@ def test_an_element_of_a_urdf_is_read_as_libfranka_does(tmp_path: Path) -> None:
     robot = sm.load_robot(file, tool="fr3_link8")
     # Without ends of its own the curve ends at the limits of the joint.
     assert robot.position_based_limits[:, 0].tolist() == [6.0, 0.3, -2.7437, 2.7437]
-    file.write_text(text.replace('deceleration_limit="6.0"', ""), encoding="utf-8")
-    with pytest.raises(sm.errors.RobotError, match="deceleration_limit is None"):
-        sm.Problem(sm.load_robot(file, tool="fr3_link8"), sm.paths.Dwell(np.eye(4), 1.0))
-    file.write_text(text.replace('deceleration_limit="6.0"', 'deceleration_limit="-6"'))
-    with pytest.raises(sm.errors.RobotError, match="deceleration above 0"):
+
+
+# What a URDF has in place of ' deceleration_limit="6.0"' → what is said of it.
+BAD = {
+    "": "'fr3_joint1': <position_based_velocity_limits>: deceleration_limit is missing",
+    ' deceleration_limit="-6"': "deceleration above 0",
+    # To Python 60, to libfranka 6.
+    ' deceleration_limit="6_0"': 'deceleration_limit is "6_0", expected a number',
+    ' deceleration_limit="inf"': 'deceleration_limit is "inf"',
+    ' deceleration_limit="6.0" velocity_offset="0.3"/><position_based_velocity_limits': (
+        "'fr3_joint1' has 2 <position_based_velocity_limits> elements, expected one"
+    ),
+}
+
+
+@pytest.mark.parametrize("given", BAD)
+def test_elements_that_are_no_limits_are_refused(given: str, tmp_path: Path) -> None:
+    text = (ROOT / "robots" / "fr3.urdf").read_text("utf-8")
+    asked = ' deceleration_limit="6.0"' + (' velocity_offset="0.3"' if "velocity" in given else "")
+    assert asked in text
+    file = tmp_path / "mine.urdf"
+    file.write_text(text.replace(asked, given, 1), encoding="utf-8")
+    with pytest.raises(sm.errors.RobotError, match=re.escape(BAD[given])):
         sm.Problem(sm.load_robot(file, tool="fr3_link8"), sm.paths.Dwell(np.eye(4), 1.0))
 
 

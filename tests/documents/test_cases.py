@@ -426,6 +426,9 @@ def test_points_of_an_arc_on_a_line_are_a_line_and_one_place_is_none(tmp_path: P
     (tmp_path / "a.csv").write_text(ARCS["irbcam.csv"].replace("100,50,0,45", "50,0,0,45"))
     with pytest.raises(sm.errors.FileFormatError, match="line 4: an arc needs three points"):
         sm.files.read_path(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(ARCS["irbcam.csv"].replace("100,50,0,45", "100,5_0,0,45"))
+    with pytest.raises(sm.errors.FileFormatError, match="line 4: '5_0' is no number"):
+        sm.files.read_path(tmp_path / "a.csv")
 
 
 def test_columns_a_b_c_are_those_of_kuka(tmp_path: Path) -> None:

@@ -240,6 +240,7 @@ BAD: Mapping[str, tuple[str, str]] = {
         "three numbers",
     ),
     "none.conf": ("delta_theta = [0, 0, 0, 0, 0, 0]", "no 'delta_a'"),
+    "python.conf": ("delta_theta = [0, 0, 1_0, 0, 0, 0]\n", "delta_theta is .* six numbers"),
     "five.conf": ("delta_theta = [0, 0, 0, 0, 0]\n", "expected|no 'delta"),
 }
 

@@ -15,6 +15,7 @@ from selfmotion.basics.arrays import (
     as_whole as as_whole,
     check_executor as check_executor,
     is_number as is_number,
+    number_in as number_in,
     per_joint as per_joint,
     plain_numbers as plain_numbers,
     public_name as public_name,

@@ -175,6 +175,17 @@ def is_number(value: Any) -> bool:
     return isinstance(value, float) or (isinstance(value, int) and value.bit_length() < 1024)
 
 
+def number_in(text: str) -> float | None:
+    """Return the number that a text of a file is, None where it is none.
+
+    Python reads 1_0 as 10, programs that write files and others that read them do not.
+    """
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None
+
+
 def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:
     """Return `value`, True or False; `error` otherwise, with the name `what`."""
     if not isinstance(value, bool | np.bool_):

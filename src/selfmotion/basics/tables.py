@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics.arrays import TURN, Array, is_number
+from selfmotion.basics.arrays import TURN, Array, is_number, number_in
 from selfmotion.basics.errors import FileFormatError, nearest
 from selfmotion.basics.files import lines_of, text_of, write_text
 
@@ -199,14 +199,9 @@ def _lines(file: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
 
 
 def _as_float(cell: str, mark: str) -> float | None:
-    """Return the number in a cell, None where it is none; Python's 1_0 is none."""
-    text = cell
-    if mark != "," and _DECIMAL_COMMA.fullmatch(cell):
-        text = cell.replace(",", ".")
-    try:
-        return None if "_" in text else float(text)
-    except ValueError:
-        return None
+    """Return the number in a cell, None where it is none."""
+    is_comma = mark != "," and _DECIMAL_COMMA.fullmatch(cell)
+    return number_in(cell.replace(",", ".") if is_comma else cell)
 
 
 def _number(cell: str, where: str, mark: str) -> float:

@@ -16,6 +16,7 @@ from selfmotion.basics import (
     RobotError,
     is_number,
     nearest,
+    number_in,
     read_document,
     shown,
 )
@@ -106,11 +107,9 @@ def _deltas(file: Path, text: str) -> Array:
     for key in DELTAS:
         if key not in found:
             raise RobotError(f"{file}: has no '{key}', expected {', '.join(DELTAS)}")
-        try:
-            row = [float(value) for value in found[key].split(",")]
-        except ValueError:
-            row = []
-        if len(row) != len(FRAMES) or not np.isfinite(row).all():
+        read = [number_in(value) for value in found[key].split(",")]
+        row = [value for value in read if value is not None and np.isfinite(value)]
+        if not len(row) == len(read) == len(FRAMES):
             raise RobotError(f"{file}: {key} is [{found[key]}], expected six numbers")
         rows.append(row)
     return np.array(rows)

@@ -1,6 +1,5 @@
 """Velocity limits that depend on the position of a joint, as the URDF of its maker gives them."""
 
-import math
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, RobotError, read_only
 from selfmotion.model.robot.urdf import Urdf
+from selfmotion.model.robot.urdf_elements import number, only
 
 # The element and its attributes that libfranka reads (src/joint_velocity_limits.cpp of 0.21.2).
 _ELEMENT = "position_based_velocity_limits"
@@ -23,28 +23,28 @@ def position_based_limits(urdf: Urdf, joints: Sequence[str], lower: Array, upper
     Raises
     ------
     RobotError
-        A number is none, or out of range.
+        A number is none, or out of range, or a joint has several such elements.
     """
     found = np.array([np.ones(len(joints)), np.zeros(len(joints)), lower, upper])
     found[2:] = np.array([[-np.inf], [np.inf]])
     if _ELEMENT not in urdf.text:
         return read_only(found)
-    elements = {
-        joint.get("name"): joint.find(_ELEMENT)
+    by_name = {
+        joint.get("name"): joint
         # Of the robot alone: controls and transmissions name joints, too.
         for joint in ElementTree.fromstring(urdf.text).findall("joint")
     }
     for k, name in enumerate(joints):
-        element = elements.get(name)
+        where = f"{urdf.source}: joint '{name}'"
+        element = only(by_name[name], _ELEMENT, where) if name in by_name else None
         if element is None:
             continue
-        where = f"{urdf.source}: joint '{name}': <{_ELEMENT}>"
-        ends = {"lower": float(lower[k]), "upper": float(upper[k])}
-        found[:, k] = [
-            _number(element, _DECELERATION, where),
-            _number(element, _OFFSET, where),
-            *(_number(element, end, where, usual) for end, usual in ends.items()),
-        ]
+        where = f"{where}: <{_ELEMENT}>"
+        for end, usual in (("lower", lower[k]), ("upper", upper[k])):
+            if np.isfinite(usual):
+                element.attrib.setdefault(end, repr(float(usual)))
+        keys = _DECELERATION, _OFFSET, "lower", "upper"
+        found[:, k] = [number(element, key, where) for key in keys]
         if not (found[0, k] > 0.0 and found[1, k] >= 0.0 and found[2, k] < found[3, k]):
             raise RobotError(
                 f"{where} has {_DECELERATION} {found[0, k]:g}, {_OFFSET} {found[1, k]:g}, lower "
@@ -52,19 +52,3 @@ def position_based_limits(urdf: Urdf, joints: Sequence[str], lower: Array, upper
                 f"offset of 0 or more, and lower below upper"
             )
     return read_only(found)
-
-
-def _number(
-    element: ElementTree.Element, name: str, where: str, usual: float | None = None
-) -> float:
-    """Return an attribute as a finite number."""
-    text = element.get(name)
-    if text is None and usual is not None and math.isfinite(usual):
-        return usual
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise RobotError(f"{where}: {name} is {text!r}, expected a finite number")
-    return value

@@ -4,7 +4,7 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 
-from selfmotion.basics import RobotError, nearest
+from selfmotion.basics import RobotError, nearest, number_in
 
 # Largest number in any unit of an arm; larger ones are typing errors.
 LARGEST = 1e9
@@ -21,12 +21,9 @@ def numbers(
         It is missing, empty, no number, not finite, beyond all sense, or there are not `count`.
     """
     text = element.get(key)
-    try:
-        values = [float(word) for word in (text or "").split()]
-    except ValueError:
-        values = []
-    # Python reads 1_000, Pinocchio does not.
-    if len(values) != count or not all(map(math.isfinite, values)) or "_" in (text or ""):
+    found = [number_in(word) for word in (text or "").split()]
+    values = [value for value in found if value is not None and math.isfinite(value)]
+    if not len(values) == len(found) == count:
         given = "is missing" if text is None else f'is "{text}"'
         wanted = "a number" if count == 1 else f"{count} numbers, parted by spaces"
         raise RobotError(f"{where}: {key} {given}, expected {wanted}")
@@ -46,7 +43,7 @@ def only(parent: ElementTree.Element, tag: str, where: str) -> ElementTree.Eleme
     Raises
     ------
     RobotError
-        There are more, of which Pinocchio would silently take the first.
+        There are more, of which libraries silently take the first.
     """
     found = parent.findall(tag)
     if len(found) > 1:

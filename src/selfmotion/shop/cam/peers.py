@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, is_number, lines_of, shown, text_of
+from selfmotion.basics import Array, FileFormatError, is_number, lines_of, number_in, shown, text_of
 from selfmotion.shop.cam.cuts import Machine, arc_points
 from selfmotion.shop.cam.path_rows import PoseRows
 
@@ -59,11 +59,8 @@ def _reader_of(
 
 
 def _number(file: FilePath, line: int, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
+    value = number_in(text)
+    if value is None or not np.isfinite(value):
         raise FileFormatError(f"{file}: line {line}: {shown(text)} is no number")
     return value
 
