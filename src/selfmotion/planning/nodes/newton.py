@@ -117,7 +117,8 @@ class _Solver:
         each = self._cost_scale / max(int((h > -1e2).sum()), 1)
         self._rough, last = roughly, SETTINGS.mu_warm if roughly else SETTINGS.mu_last
         self._last_barrier, self._rho = last * each, SETTINGS.rho * self._cost_scale
-        self._barrier = (SETTINGS.mu_first if multipliers is None else SETTINGS.mu_warm) * each
+        first = SETTINGS.mu_violated if start.violation > 0.0 else SETTINGS.mu_first
+        self._barrier = (first if multipliers is None else SETTINGS.mu_warm) * each
         self._rho_updates = 0
         self._active: Flags = np.zeros(len(h), dtype=np.bool_)
         self._slacks = self._elastics = self._multipliers = np.zeros(0)
