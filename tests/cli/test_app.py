@@ -20,7 +20,7 @@ import selfmotion as sm
 from selfmotion.basics import jit, seconds_waited_for_kernels
 from selfmotion.shell.cli import app
 from selfmotion.shell.cli.app import StageDisplay
-from support.shell import complaint, invoke
+from support.shell import complaint, in_full, invoke
 
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
 
@@ -327,14 +327,18 @@ def open_nothing() -> io.StringIO:
     ],
 )
 def test_of_bad_input_a_program_sees_json(
-    tmp_path: Path, arguments: tuple[str, ...], expected: dict[str, object]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    expected: dict[str, object],
 ) -> None:
     (tmp_path / "bad.toml").write_text('[robot]\nname = "panda"\n[path]\nfle = "x.csv"\n')
     shutil.copy(tmp_path / "bad.toml", tmp_path / "my file.toml")
     (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0.3,0,0.5\n1,0.3,zero,0.5\n")
-    result = run(*arguments, "--json", cwd=tmp_path)
-    assert result.returncode == 2, result.stderr
-    error = json.loads(result.stdout)["error"]
+    monkeypatch.chdir(tmp_path)
+    code, output, errors = in_full(*arguments, "--json")
+    assert code == 2, errors
+    error = json.loads(output)["error"]
     assert error | expected == error
     assert error["message"]
-    assert error["message"] in result.stderr
+    assert error["message"] in errors

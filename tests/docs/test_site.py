@@ -19,6 +19,8 @@ from support.doors import named, offered
 from support.layouts import WIDTHS, chromium, faults
 from support.places import ROOT
 
+pytestmark = pytest.mark.site
+
 EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py"))
 
 

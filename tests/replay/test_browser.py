@@ -385,6 +385,7 @@ def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
     assert_quiet(page)
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("name", sorted(NAMED_ARMS))
 def test_every_named_arm_is_drawn(open_page, pages, tmp_path, name):
     plan = planar_plan() if name == "planar_3r" else arm_plan(name)

@@ -2,7 +2,7 @@
 
 import io
 import sys
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest.mock import patch
 
@@ -18,6 +18,19 @@ def invoke(*arguments: str | Path) -> tuple[int, str]:
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result.exit_code, result.stdout
+
+
+def in_full(*arguments: str | Path) -> tuple[int | str | None, str, str]:
+    """Return exit code, output and errors of the command with all that surrounds it."""
+    output, errors = io.StringIO(), io.StringIO()
+    with (
+        patch.object(sys, "argv", ["selfmotion", *map(str, arguments)]),
+        redirect_stdout(output),
+        redirect_stderr(errors),
+        pytest.raises(SystemExit) as stopped,
+    ):
+        main()
+    return stopped.value.code, output.getvalue(), errors.getvalue()
 
 
 def complaint(*arguments: str | Path) -> str:
