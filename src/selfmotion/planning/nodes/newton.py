@@ -76,6 +76,7 @@ def minimise(
     *,
     roughly: bool = False,
     max_iterations: int = SETTINGS.max_iterations,
+    mu_first: float = SETTINGS.mu_first,
 ) -> Optimum:
     """Return the local optimum near a motion.
 
@@ -89,8 +90,10 @@ def minimise(
         Whether loose tolerances are enough: the result is a start of another optimisation.
     max_iterations : int
         Limit of iterations.
+    mu_first : float
+        First barrier parameter without multipliers, in the unit of `NewtonSettings.mu_first`.
     """
-    solver = _Solver(start, multipliers, roughly=roughly)
+    solver = _Solver(start, multipliers, mu_first, roughly=roughly)
     smallest, stalled = np.inf, 0
     for _ in range(max_iterations):
         status = solver.advance(callback)
@@ -111,14 +114,15 @@ class _Solver:
     s, e and λ are those of the active rows, in their order.
     """
 
-    def __init__(self, start: NodeMotion, multipliers: Array | None, *, roughly: bool) -> None:
+    def __init__(
+        self, start: NodeMotion, multipliers: Array | None, mu_first: float, *, roughly: bool
+    ) -> None:
         self.motion, h = start, start.h
         self._cost_scale = max(abs(start.objective), np.finfo(float).tiny)
         each = self._cost_scale / max(int((h > -1e2).sum()), 1)
         self._rough, last = roughly, SETTINGS.mu_warm if roughly else SETTINGS.mu_last
         self._last_barrier, self._rho = last * each, SETTINGS.rho * self._cost_scale
-        first = SETTINGS.mu_violated if start.violation > 0.0 else SETTINGS.mu_first
-        self._barrier = (first if multipliers is None else SETTINGS.mu_warm) * each
+        self._barrier = (mu_first if multipliers is None else SETTINGS.mu_warm) * each
         self._rho_updates = 0
         self._active: Flags = np.zeros(len(h), dtype=np.bool_)
         self._slacks = self._elastics = self._multipliers = np.zeros(0)

@@ -50,9 +50,9 @@ class NewtonSettings:
     # --- barrier
     # First μ, relative to F divided by the number of rows.
     mu_first: float = 1e-1
-    # The same where rows are violated at the start: slacks and elastic variables are far from the
-    # central path of a smaller one, and steps end at their bounds.
-    mu_violated: float = 1.0
+    # The same where rows are still violated after many iterations: slacks and elastic variables are
+    # far from the central path of a smaller μ, and steps end at their bounds.
+    mu_again: float = 1.0
     # Last μ, in the same unit.
     mu_last: float = 1e-6
     # First μ of a warm start, and last μ where a rough optimum is enough, in the same unit.

@@ -137,6 +137,9 @@ class LocalSearch:
             known = best if best.status not in ARRIVED else first
             rest = self.minimise(known.motion, known.multipliers if best is first else None)
             best = min(best, rest, key=rank)
+            if not is_kept(best.motion) and rest.status not in ARRIVED:
+                again = self.minimise(best.motion, mu_first=SETTINGS.mu_again)
+                best = min(best, again, key=rank)
         if not is_kept(best.motion) and self.recorder.ended is None:
             # What control points of few nodes cannot keep, the curve may.
             best = min(best, self._on_halved(best), key=rank)
@@ -203,10 +206,13 @@ class LocalSearch:
         *,
         roughly: bool = True,
         most: int = SETTINGS.max_iterations,
+        mu_first: float = SETTINGS.mu_first,
     ) -> Optimum:
         """Return the optimum near a motion; `multipliers` (R,) of its rows may be known."""
         report = self.recorder.report
-        return minimise(motion, report, multipliers, roughly=roughly, max_iterations=most)
+        return minimise(
+            motion, report, multipliers, roughly=roughly, max_iterations=most, mu_first=mu_first
+        )
 
     def outcome(self, optimum: Optimum) -> NodeOutcome:
         """Return a result of Newton's method as an outcome."""
