@@ -126,7 +126,7 @@ def main() -> None:
         clearance=sm.constraints.Clearance(distance=APART),
         order="given" if options.given else "free",
         branches=2,
-        deadline=2.0,
+        move_seconds=2.0,
         folder=options.folder,
         progress=progress,
     )

@@ -145,7 +145,7 @@ def main() -> None:
             clearance, first, last = drawn
             clearance.model(robot)
             began = time.perf_counter()
-            move = sm.move(robot, first, last, clearance=clearance, deadline=IN_TIME)
+            move = sm.move(robot, first, last, clearance=clearance, seconds=IN_TIME)
             seconds.append(time.perf_counter() - began)
             if not move.verified:
                 missed += 1

@@ -74,7 +74,7 @@ def main(
     for number in range(seed, seed + count):
         asked, began = seams(number), time.process_time()
         home = sm.NAMED_ARMS["panda"].home
-        program = sm.plan_job(arm, asked, branches=2, deadline=2.0, start=home)
+        program = sm.plan_job(arm, asked, branches=2, move_seconds=2.0, start=home)
         seconds.append(time.process_time() - began)
         fault = wrong(program, asked)
         whole, missing = whole + program.verified, missing + len(program.missing)

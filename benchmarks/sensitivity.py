@@ -65,7 +65,7 @@ def moved(name: str, which: int) -> Callable[[], Outcome]:
     clearance, first, last = drawn[which]
 
     def outcome() -> Outcome:
-        move = sm.move(robot, first, last, clearance=clearance, deadline=60.0)
+        move = sm.move(robot, first, last, clearance=clearance, seconds=60.0)
         return None if move.trajectory is None else move.trajectory.duration, move.verified
 
     return outcome

@@ -3,6 +3,7 @@
 from selfmotion.basics import (
     BreakdownError,
     CollisionError,
+    DeadlineError,
     FeedError,
     FileFormatError,
     InverseKinematicsError,
@@ -19,6 +20,7 @@ from selfmotion.basics import (
 __all__ = [
     "BreakdownError",
     "CollisionError",
+    "DeadlineError",
     "FeedError",
     "FileFormatError",
     "InverseKinematicsError",

@@ -445,7 +445,8 @@ def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> Non
         ({"executor": 5}, "executor is 5, expected one of concurrent"),
         ({"replays": -1}, "replays is -1"),
         ({"progress": 5}, "progress is 5, expected a function"),
-        ({"deadline": 3.0}, "deadline: is no option of a batch; expected search, "),
+        ({"deadline": 0.0}, "deadline is 0.0, expected a number > 0"),
+        ({"callback": print}, "callback: is no option of a batch; expected search, "),
         (
             {"problems": [sm.files.PlanRequest(problem)], "tolerance": 1e-3},
             "tolerance: has no effect: each",
@@ -523,3 +524,17 @@ def test_a_file_that_cannot_be_read_is_a_row_and_rows_are_json(grid: Path, tmp_p
     assert rows["one"]["verified"]
     assert "is not TOML" in rows["torn"]["error"]
     assert rows["torn"]["aim"] is None
+
+
+def test_what_a_deadline_left_is_planned_again(tmp_path: Path, panda: sm.RobotModel) -> None:
+    """A row says why there is no plan; with more time it is made, and kept once verified."""
+    line = sm.paths.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
+    problem = sm.Problem(panda, line, "position", clearance=None)
+    out = tmp_path / "out"
+    (late,) = sm.plan_many([problem], InPlace(), out=out, deadline=1e-9).rows
+    assert (late.verified, late.reason) == (False, "deadline")
+    assert "deadline of 1e-09 s" in late.error
+    batch = sm.plan_many([problem], InPlace(), out=out, deadline=1e6)
+    assert (batch.rows[0].verified, batch.resumed) == (True, 0)
+    again = sm.plan_many([problem], InPlace(), out=out, deadline=1e-9)
+    assert (again.rows[0].verified, again.resumed) == (True, 1)

@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.shell.cli import jobs
 from selfmotion.shell.cli.documents import seams_of_file
 from support.places import ROOT
-from support.shell import complaint, invoke
+from support.shell import complaint, in_full, invoke
 
 TABLE = (ROOT / "examples" / "seams.csv").read_text()
 JOB = """
@@ -72,6 +72,26 @@ def test_a_column_of_a_table_tells_the_seams(table) -> None:
     np.testing.assert_allclose(job.seams[0].path.pose(0.0).translation, [0.45, 0.2, 0.3])
     assert job.seams[0].path.feeds[0].asked == 0.05
     np.testing.assert_allclose(job.settings["start"], sm.NAMED_ARMS["panda"].home)
+
+
+def test_a_former_key_is_read_with_a_note(table) -> None:
+    """Seconds of the processor for a move were called a deadline, which is of the whole job."""
+    former = seams_of_file(table, ["job.deadline=3.0"], False)
+    assert former.settings["move_seconds"] == 3.0
+    assert "is called 'move_seconds' by now" in former.remarks[0]
+    now = seams_of_file(table, ["job.move_seconds=3.0"], False)
+    assert (now.settings["move_seconds"], now.notes) == (3.0, ())
+
+
+def test_a_deadline_of_the_shell_ends_a_job_and_a_plan(table, tmp_path) -> None:
+    at_once = ("--deadline", "1e-9", "--json")
+    code, output, errors = in_full("job", table, "--folder", tmp_path / "kept", *at_once)
+    assert code == 1
+    assert "the deadline of 1e-09 s came before there was a program" in errors
+    assert json.loads(output)["error"]["class"] == "DeadlineError"
+    # Without one there is the motion of least joint speed to end with.
+    code, output, _ = in_full("plan", "panda", "--circle", "0.1", *at_once)
+    assert (code, json.loads(output)["status"]) == (0, "deadline")
 
 
 def test_anything_of_a_job_file_can_be_set(table) -> None:

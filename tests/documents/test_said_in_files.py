@@ -20,7 +20,7 @@ SCHEMA = json_schema()
 WHILE_IT_RUNS = "is of the run, and an option of the command"
 EXCEPTIONS = {
     "warm_start": "is another plan: --from",
-    "deadline": WHILE_IT_RUNS,
+    "deadline": WHILE_IT_RUNS + ": --deadline",
     "callback": WHILE_IT_RUNS,
     "progress": WHILE_IT_RUNS,
     "executor": WHILE_IT_RUNS + ": --workers, --dask",

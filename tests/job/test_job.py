@@ -471,6 +471,17 @@ def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_p
     np.testing.assert_array_equal(again.trajectory.q, program.trajectory.q)
 
 
+def test_a_deadline_ends_a_job_which_goes_on_from_its_folder(program, tmp_path) -> None:
+    panda, seams = robot_named("panda"), row_of_seams()
+    given = {"start": HOME, "end": HOME, "branches": 1}
+    with pytest.raises(sm.errors.DeadlineError, match="give a folder="):
+        sm.plan_job(panda, seams, **given, deadline=1e-9)
+    with pytest.raises(sm.errors.DeadlineError, match="keeps it: plan again"):
+        sm.plan_job(panda, seams, **given, folder=tmp_path, deadline=1e-9)
+    again = sm.plan_job(panda, seams, **given, folder=tmp_path, deadline=1e6)
+    np.testing.assert_array_equal(again.trajectory.q, program.trajectory.q)
+
+
 def test_bad_jobs_are_refused() -> None:
     panda, seams = robot_named("panda"), row_of_seams(2)
     for given, message in (

@@ -141,7 +141,7 @@ def test_what_is_not_found_is_said_and_no_more() -> None:
     clearance = sm.constraints.Clearance(list(SCENE), 5e-3)
     first, last = ROUND_A_BOX
     # Nothing but the straight one is looked at before the deadline.
-    blocked = sm.move(panda, first, last, clearance=clearance, deadline=1e-6)
+    blocked = sm.move(panda, first, last, clearance=clearance, seconds=1e-6)
     assert "no way was found between the configurations in " in blocked.trouble
     met = sm.move(panda, first, HOME + turned(0.0, 1.2, 0.5), clearance=clearance)
     assert "the last configuration is not allowed" in met.trouble

@@ -168,7 +168,7 @@ def test_each_parameter_of_move_matters() -> None:
         "clearance": sm.constraints.Clearance([box("far", FAR + FURTHER)], 0.01),
         "via": [PANDA_HOME + 0.2 * np.arange(7) / 7.0],
         "task": "position",
-        "deadline": 1e-9,
+        "seconds": 1e-9,
         "rng": 1,
         "progress": tell,
     }
@@ -185,13 +185,13 @@ def test_each_parameter_of_move_matters() -> None:
             other = found(**{name: value})
         except sm.errors.ProblemError as error:
             other = f"{name}: refused" if name in str(error) else base
-        # The straight move is found at once, whatever the seed, and before any deadline.
-        if name not in ("rng", "deadline"):
+        # The straight move is found at once, whatever the seed, and before any time is up.
+        if name not in ("rng", "seconds"):
             assert other != base or (name == "progress" and heard), name
     # A constraint on an end is nothing that a move keeps: its ends are given.
     with pytest.raises(sm.errors.ProblemError, match="EndConfiguration"):
         found(constraints=[sm.constraints.EndConfiguration(last)])
-    # Where no way is straight, seed and deadline matter.
+    # Where no way is straight, seed and seconds matter.
     turns = np.array([[0.9, 1.2, 0.0, 0.5, 0.0, 0.0, 0.0], [-0.9, 1.2, 0.0, 0.5, 0.0, 0.0, 0.0]])
     past = dict(zip(("first", "last"), PANDA_HOME + turns, strict=True))
     post = sm.constraints.Clearance(
@@ -199,7 +199,7 @@ def test_each_parameter_of_move_matters() -> None:
     )
     ways = [found(clearance=post, **past, rng=seed)[1] for seed in (0, 1)]
     assert ways[0] != ways[1]
-    assert "no way was found" in found(clearance=post, **past, deadline=1e-9)[2]
+    assert "no way was found" in found(clearance=post, **past, seconds=1e-9)[2]
 
 
 def test_each_parameter_of_other_paces_matters() -> None:
@@ -269,6 +269,7 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
         "clearance": sm.constraints.Clearance([box("far", FAR + FURTHER)], 0.01),
         "branches": 2,
         "seconds_per_cost": 5.0,
+        "move_seconds": 1e-9,
         "deadline": 1e-9,
         # Of a program that begins elsewhere, the seam does as well.
         "warm_start": sm.plan_job(PANDA, [seam("a", -0.05)], branches=1, start=home),
@@ -295,7 +296,7 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
 
     base = found()
     for name, value in changed.items():
-        if name in ("seconds_per_cost", "deadline", "branches"):
+        if name in ("seconds_per_cost", "move_seconds", "branches"):
             # Of two seams with a straight move there is nothing to choose or to look for.
             continue
         if name == "executor":
@@ -304,6 +305,10 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
             continue
         if name in ("order", "rng"):
             assert found(seams=listed, **{name: value}) != found(seams=listed), name
+            continue
+        if name == "deadline":
+            with pytest.raises(sm.errors.DeadlineError, match="deadline of 1e-09 s"):
+                found(deadline=value)
             continue
         other = found(**{name: value})
         if name == "folder":

@@ -26,6 +26,7 @@ from selfmotion.basics.arrays import (
 from selfmotion.basics.errors import (
     BreakdownError as BreakdownError,
     CollisionError as CollisionError,
+    DeadlineError as DeadlineError,
     FeedError as FeedError,
     FileFormatError as FileFormatError,
     InverseKinematicsError as InverseKinematicsError,

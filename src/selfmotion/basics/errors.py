@@ -184,3 +184,7 @@ class RenderError(SelfmotionError):
 
 class PlanError(SelfmotionError):
     """A plan below the required quality; raised by `Plan.require`."""
+
+
+class DeadlineError(PlanError):
+    """The deadline came before there was anything to return."""

@@ -6,7 +6,7 @@ from selfmotion.planning.planner.branches import (
     like_before as like_before,
     near_start as near_start,
 )
-from selfmotion.planning.planner.effort import Search as Search
+from selfmotion.planning.planner.effort import Deadline as Deadline, Search as Search
 from selfmotion.planning.planner.fastest import Fastest as Fastest, fastest as fastest
 from selfmotion.planning.planner.guess import check_joints as check_joints
 from selfmotion.planning.planner.parts import plan_in_parts as plan_in_parts

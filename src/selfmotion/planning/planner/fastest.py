@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
+    DeadlineError,
     PathError,
     PlanError,
     ProblemError,
@@ -244,8 +245,11 @@ def fastest(
         if rounds.best is None and not late:
             raise
     if rounds.best is None:
-        when = f" in {deadline} s" if status is Status.DEADLINE else ""
-        raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
+        if status is Status.DEADLINE:
+            raise DeadlineError(
+                f"no motion keeps all limits at any pace in {deadline} s: {rounds.verdict}"
+            )
+        raise PlanError(f"no motion keeps all limits at any pace: {rounds.verdict}")
     found = rounds.retimed
     best = with_ending(rounds.best, status) if status.is_cut_short else rounds.best
     return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)

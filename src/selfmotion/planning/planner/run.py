@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import (
-    PlanError,
+    DeadlineError,
     ProblemError,
     Progress,
     as_called,
@@ -233,7 +233,7 @@ def plan(
         The path has a feed that is impossible for any arm; before any planning.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
-    PlanError
+    DeadlineError
         The deadline came before there was a complete motion.
     ProblemError
         An argument is invalid, or has no effect on this problem.
@@ -277,7 +277,7 @@ def plan(
     except KeyboardInterrupt:
         if not clock.passed:
             raise
-        raise PlanError(
+        raise DeadlineError(
             f"the deadline of {deadline} s came before there was a complete motion; allow more "
             f"time, or give a start"
         ) from None

@@ -49,8 +49,8 @@ from selfmotion.planning.transfer.rrt_connect import (
 from selfmotion.problem.constraints import Constraint, Envelope
 from selfmotion.problem.problem import at_all_times, envelope_of
 
-# Default deadline of a move [s].
-MOVE_DEADLINE = 10.0
+# Default time of the processor for a move [s].
+MOVE_SECONDS = 10.0
 # Share of the limits that is used.
 _USED = 0.95
 # Without a limit of acceleration: time to full speed [s] …
@@ -135,7 +135,7 @@ class FreeMotions:
         self,
         first: Array,
         last: Array,
-        seconds: float = MOVE_DEADLINE,
+        seconds: float = MOVE_SECONDS,
         known: Array | None = None,
     ) -> Move:
         """Return the move between configurations (n,), or the cause why there is none.

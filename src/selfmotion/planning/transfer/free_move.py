@@ -22,7 +22,7 @@ from selfmotion.basics import (
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Task
 from selfmotion.planning.result import Move
-from selfmotion.planning.transfer.free_motion import MOVE_DEADLINE, FreeMotions, is_pose
+from selfmotion.planning.transfer.free_motion import MOVE_SECONDS, FreeMotions, is_pose
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times
 
@@ -36,7 +36,7 @@ def move(
     clearance: Clearance | None = NO_OVERLAP,
     via: Sequence[npt.ArrayLike] = (),
     task: Task | str = "pose",
-    deadline: float = MOVE_DEADLINE,
+    seconds: float = MOVE_SECONDS,
     rng: np.random.Generator | int = 0,
     progress: Progress = silent,
 ) -> Move:
@@ -64,11 +64,11 @@ def move(
         is room for a curve.
     task : Task or str
         The rows of the pose that count where an end is one.
-    deadline : float
+    seconds : float
         Processor time after which the search fails [s]: the result is independent of other
         processes.
     rng : Generator or int
-        Shifts the samples; the same one gives the same move, unless the deadline ends it.
+        Shifts the samples; the same one gives the same move, unless the search fails before.
     progress : callable, optional
         Called with the stage, as in `plan`.
 
@@ -103,7 +103,7 @@ def move(
             f"task is '{Task.of(task).value}', which counts where an end is a pose: all ends are "
             f"configurations"
         )
-    seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
+    seconds, generator = as_number(seconds, "seconds", above=0.0), random_numbers(rng)
     motions = FreeMotions(robot, conditions, generator, obeying(progress))
     with one_blas_thread(), held_interruption():
         ends = [motions.configurations(end, Task.of(task)) for end in given]

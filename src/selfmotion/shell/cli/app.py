@@ -289,8 +289,9 @@ INTERRUPTED = 130
 def main() -> None:
     """Run the command; exit code 2 and one line for bad input, 3 for a fault of ours.
 
-    130 and a line where it was stopped before there was anything to keep. With `--json` what is
-    wrong is on the output as JSON as well, see `error_json`.
+    1 and a line where a deadline came before there was a motion, 130 and a line where it was
+    stopped before there was anything to keep. With `--json` what is wrong is on the output as JSON
+    as well, see `error_json`.
     """
     as_json = "--json" in sys.argv[1:]
     try:
@@ -299,7 +300,8 @@ def main() -> None:
         code = end.code
     except sm.SelfmotionError as error:
         _fail(error, in_shell(str(error)), as_json)
-        code = BAD_INPUT
+        # With more time there may be a motion: nothing is wrong with what was given.
+        code = NOT_VERIFIED if isinstance(error, sm.errors.DeadlineError) else BAD_INPUT
     except typer.TyperException as error:
         # Of arguments and options themselves; it says so on its own where nothing is JSON.
         _fail(error, error.format_message(), as_json)

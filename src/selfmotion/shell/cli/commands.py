@@ -41,6 +41,7 @@ def plan(
     warm: options.FromOption = None,
     settings: options.SetOption = None,
     max_evaluations: options.LimitOption = None,
+    deadline: options.DeadlineOption = None,
     search: options.SearchOption = None,
     compare: options.CompareOption = False,
     allow_code: options.AllowCodeOption = False,
@@ -60,6 +61,7 @@ def plan(
     asked = {
         "max_evaluations": max_evaluations,
         "search": options.search_of(search, compare, job.search),
+        "deadline": deadline,
     }
     given = {key: value for key, value in asked.items() if value is not None}
     remarks = job.problem.remarks

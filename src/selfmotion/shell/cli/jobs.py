@@ -61,6 +61,10 @@ def job(
             "the rest begins at its motions.",
         ),
     ] = None,
+    deadline: Annotated[
+        float | None,
+        typer.Option(help="Stop after so many seconds by the clock; --folder keeps what is done."),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
@@ -107,6 +111,7 @@ def job(
                 folder=kept,
                 executor=cluster or pool,
                 warm_start=earlier,
+                deadline=deadline,
                 progress=display.stage,
             )
     except KeyboardInterrupt:

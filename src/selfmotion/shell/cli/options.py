@@ -221,6 +221,10 @@ DampedOption = Annotated[
         "--damped", help="Damp the inverse near singular poses; there the tool may leave its path."
     ),
 ]
+DeadlineOption = Annotated[
+    float | None,
+    typer.Option(help="Stop after so many seconds by the clock, with the best so far."),
+]
 LimitOption = Annotated[
     int | None, typer.Option(help="Limit on cost evaluations while optimising.")
 ]

@@ -80,6 +80,9 @@ def batch(
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
+    deadline: Annotated[
+        float | None, typer.Option(help="For each plan: stop after so many seconds by the clock.")
+    ] = None,
     replays: Annotated[
         int, typer.Option(min=0, help="Write replays of so many of the best plans.")
     ] = 3,
@@ -115,7 +118,13 @@ def batch(
     try:
         with executor_at(dask) as executor, BatchDisplay(stages) as display:
             result = plan_items(
-                items, executor, out=out, workers=workers, replays=replays, progress=display.show
+                items,
+                executor,
+                out=out,
+                workers=workers,
+                replays=replays,
+                deadline=deadline,
+                progress=display.show,
             )
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{out}': run again to go on")

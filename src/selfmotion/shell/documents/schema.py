@@ -182,7 +182,7 @@ _OF_SEAM: Mapping[str, Any] = {
 _OF_JOB: Mapping[str, Any] = {
     "order": {"enum": ["free", "given"]},
     **{name: {"type": "integer"} for name in ("branches", "rng")},
-    **dict.fromkeys(("seconds_per_cost", "deadline"), _NUMBER),
+    **dict.fromkeys(("seconds_per_cost", "move_seconds"), _NUMBER),
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from selfmotion.basics import (
     FORMER_CLEARANCE,
     FileFormatError,
+    ProblemError,
     SelfmotionError,
     as_path,
     in_si,
@@ -48,7 +49,12 @@ from selfmotion.work.job import FASTEST_FEED, Program, Seam, highest_feed, plan_
 
 # Keys of what seams share, of a job, of a seam besides those of a problem, of seams in one table.
 SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "clearance")
-JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
+MOVE_SECONDS, FORMER_SECONDS = "move_seconds", "deadline"
+JOB = ("start", "end", "order", "branches", "seconds_per_cost", MOVE_SECONDS, "rng")
+_RENAMED = (
+    "job: 'deadline', seconds of the processor for each move, is called 'move_seconds' by now; "
+    "--deadline ends the whole job"
+)
 SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
 _PLACED = ("file", "frame", "weave", "leads")
@@ -77,6 +83,8 @@ class SeamJob:
         How fast that may be at most [m/s].
     unjudged : tuple of str
         What nothing is asked of, as of files of machine tools; programs say it.
+    notes : tuple of str
+        Of keys that are called otherwise by now.
     """
 
     robot: RobotModel
@@ -85,6 +93,7 @@ class SeamJob:
     at_feed: Callable[[float], "SeamJob"] | None = None
     most_feed: float = FASTEST_FEED
     unjudged: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -106,7 +115,7 @@ class SeamJob:
                 continue
             for remark in problem.remarks:
                 found.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
-        return tuple(found.values())
+        return (*self.notes, *found.values())
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.
@@ -115,6 +124,11 @@ class SeamJob:
         """
         at_feed = self.at_feed
         if at_feed is not None:
+            if options.get("deadline") is not None:
+                raise ProblemError(
+                    "deadline: has no effect where the highest feed is looked for, which plans "
+                    "several jobs; give a feed, or leave it out"
+                )
             return highest_feed(lambda feed: at_feed(feed).plan(**options), self.most_feed).program
         program = plan_job(self.robot, self.seams, **{**self.settings, **options})
         return replace(program, unjudged=self.unjudged)
@@ -194,6 +208,7 @@ def seam_job_of(
         tuple(seams),
         {**options, "constraints": kept},
         unjudged=(UNJUDGED,) if is_cut else (),
+        notes=(_RENAMED,) if FORMER_SECONDS in settings else (),
     )
 
 
@@ -328,6 +343,8 @@ class _Reader:
         if not isinstance(given, Mapping):
             raise FileFormatError(f"{self._file}: job: expected a table [job]")
         values = in_si(given)
+        if FORMER_SECONDS in values and MOVE_SECONDS not in values:
+            values[MOVE_SECONDS] = values.pop(FORMER_SECONDS)
         self._check(values, JOB, "job")
         robot, task = self.first.problem.robot, self.first.problem.task
         try:

@@ -18,7 +18,7 @@ from selfmotion.model.path import Path as ToolPath, Retimed
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.planning.result import MotionSpecification, Plan, load_plan, read_kept, write_kept
 from selfmotion.problem.problem import Problem
-from selfmotion.work.batch.items import Item, Row, measured
+from selfmotion.work.batch.items import LATE, Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
 
 # Whether a plan is what a job of a batch asks for.
@@ -94,7 +94,7 @@ class Folder:
             return None
         try:
             row = Row(file=self.plan_file(name), **values)
-            if row.key != item.key or row.fault:
+            if row.key != item.key or row.fault or row.reason == LATE:
                 return None
             if row.error:
                 return replace(row, settings=dict(item.settings))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
+from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.planning.result import Plan, files_of, identity_of, key_of, load_plan, own_modules
 from selfmotion.problem.costs import FunctionCost
@@ -14,6 +15,8 @@ from selfmotion.problem.problem import Problem, problem_to_dict
 
 # Items: problems with names, or the error of one that cannot be read.
 
+# The reason of what its deadline left without a verified motion.
+LATE = "deadline"
 # Arguments of `plan` besides the problem.
 OPTIONS = ("search", "optimizer", "tolerance", "max_evaluations")
 
@@ -217,6 +220,8 @@ def _reason(plan: Plan) -> str:
     certificate = plan.certificate
     if certificate.verified:
         return ""
+    if plan.report.status is Status.DEADLINE:
+        return LATE
     if plan.report.ending:
         return "ends on the way"
     broken = [item.requirement for item in certificate.findings if not item.satisfied]

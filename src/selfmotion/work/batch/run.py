@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import (
+    DeadlineError,
     InverseKinematicsError,
     NoSequenceError,
     PlanError,
     ProblemError,
     SelfmotionError,
     as_called,
+    as_number,
     as_path,
     as_whole,
     check_executor,
@@ -31,14 +33,18 @@ from selfmotion.planning.planner import PlanRequest
 from selfmotion.planning.result import ArmCache
 from selfmotion.problem.problem import Problem, problem_from_dict
 from selfmotion.work.batch.folder import Folder
-from selfmotion.work.batch.items import Item, Row, measured, problem_items
+from selfmotion.work.batch.items import LATE, Item, Row, measured, problem_items
 
 # Work in another process: the description of a problem in, the file of a plan out.
 
 # Arms and bodies of problems planned before.
 _arms = ArmCache()
 # Short forms of errors.
-_REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
+_REASONS = (
+    (InverseKinematicsError, "out of reach"),
+    (NoSequenceError, "no way through"),
+    (DeadlineError, LATE),
+)
 
 
 def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
@@ -56,7 +62,9 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         for name in task["modules"]:
             importlib.import_module(name)
         problem = problem_from_dict(task["problem"], _arms.of(task["files"]))
-        found = PlanRequest(problem, **task["options"]).plan()
+        deadline = task["deadline"]
+        limit = {} if deadline is None else {"deadline": deadline}
+        found = PlanRequest(problem, **task["options"]).plan(**limit)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
             found.save(file)
@@ -158,6 +166,7 @@ def plan_many(
     out: str | Path,
     workers: int | None = None,
     replays: int = 0,
+    deadline: float | None = None,
     progress: Callable[[BatchProgress], object] = silent,
     **options: Any,
 ) -> Batch:
@@ -181,6 +190,9 @@ def plan_many(
         How many processes on this machine, by default one for each core.
     replays : int
         Of how many of the best plans to write a replay.
+    deadline : float, optional
+        Time by the clock after which each plan ends with the best so far [s]. Those that it left
+        without a verified motion are planned again by the next run with the same folder.
     progress : callable, optional
         Called with a `BatchProgress` whenever a problem is finished.
     options
@@ -201,7 +213,15 @@ def plan_many(
     if not isinstance(problems, Iterable):
         raise ProblemError(f"problems are {shown(problems)}, expected a list of problems")
     items = problem_items(list(problems), options)
-    return plan_items(items, executor, out=out, workers=workers, replays=replays, progress=progress)
+    return plan_items(
+        items,
+        executor,
+        out=out,
+        workers=workers,
+        replays=replays,
+        deadline=deadline,
+        progress=progress,
+    )
 
 
 def plan_items(
@@ -211,18 +231,21 @@ def plan_items(
     out: str | Path,
     workers: int | None = None,
     replays: int = 0,
+    deadline: float | None = None,
     progress: Callable[[BatchProgress], object] = silent,
 ) -> Batch:
     """Plan items as `plan_many` plans problems."""
     check_executor(executor)
     as_called(progress, "progress")
     replays = as_whole(replays, "replays", 0, 10**9)
+    if deadline is not None:
+        deadline = as_number(deadline, "deadline", above=0.0)
     if workers is not None:
         workers = as_whole(workers, "workers", 1, 10**6)
         if executor is not None:
             raise ProblemError("workers: has no effect where an executor is given; leave it out")
     folder = Folder(as_path(out))
-    run = _Run(folder, items, progress)
+    run = _Run(folder, items, progress, deadline)
     pending = deque(items)
     if executor is not None:
         if run.through(executor, pending, _WINDOW):
@@ -257,10 +280,15 @@ class _Run:
     """One run of a batch: what is finished, and how fast it goes."""
 
     def __init__(
-        self, folder: Folder, items: Sequence[Item], progress: Callable[[BatchProgress], object]
+        self,
+        folder: Folder,
+        items: Sequence[Item],
+        progress: Callable[[BatchProgress], object],
+        deadline: float | None,
     ) -> None:
         self.rows: dict[str, Row] = {}
         self._folder, self._items, self._progress = folder, items, progress
+        self._deadline = deadline
         self._began, self.resumed = time.monotonic(), 0
 
     def through(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
@@ -299,7 +327,7 @@ class _Run:
             item.forget()
             return None
         try:
-            return item.task
+            return {**item.task, "deadline": self._deadline}
         except SelfmotionError as wrong:
             self._finish(item, {"error": str(wrong)}, b"")
             return None

@@ -18,7 +18,7 @@ from selfmotion.work.job.work import Asked, Work, seam_steps
 _TRIES = 3
 # Motions whose ends are nearer than this are one [rad or m].
 _SAME = 1e-6
-# Moves to a seam that are not found, each after its whole deadline; from then on only those that
+# Moves to a seam that are not found, each after all its seconds; from then on only those that
 # were found before lead to it.
 _NOT_FOUND = 20
 # From which state to which one past what; None is the start or the end of the program.

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
+    DeadlineError,
     PlanError,
     ProblemError,
     Progress,
@@ -33,6 +34,7 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.model.robot import RobotModel
+from selfmotion.planning.planner import Deadline
 from selfmotion.planning.result import Move, arm_digest
 from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.constraints import Clearance, Constraint
@@ -183,7 +185,8 @@ def plan_job(
     clearance: Clearance | None = NO_OVERLAP,
     branches: int = 4,
     seconds_per_cost: float = 0.0,
-    deadline: float = 10.0,
+    move_seconds: float = 10.0,
+    deadline: float | None = None,
     folder: str | Path | None = None,
     executor: Executor | None = None,
     warm_start: Program | None = None,
@@ -221,9 +224,12 @@ def plan_job(
     seconds_per_cost : float
         What a unit of a seam's cost counts, beside the time of moves [s]; by default only time
         counts.
-    deadline : float
+    move_seconds : float
         After so many seconds of the processor a move counts as not found. A move that takes nearly
         as long to find may be found on one machine, or on one day, and not on another.
+    deadline : float, optional
+        Time by the clock after which planning stops [s], as soon as the seam or move that is at
+        work is finished. With a folder, planning again goes on from there.
     folder : path, optional
         Keeps every plan and move there as soon as it is finished; a job that is begun again takes
         what it finds, and ends in the same program.
@@ -254,7 +260,7 @@ def plan_job(
         A seam asks for a feed that its path cannot have; before anything is planned. Of several
         the slowest one is told: where all ask for one feed, what is possible there is for all.
     PlanError
-        No seam has a motion.
+        No seam has a motion; `DeadlineError` where the deadline came before there was a program.
     ProblemError
         An argument is not what it should be, or what has to come first is circular.
     KeyboardInterrupt
@@ -269,11 +275,12 @@ def plan_job(
         _checked_constraints(constraints),
         _checked_clearance(clearance),
         as_whole(branches, "branches", 1, 1000),
-        as_number(deadline, "deadline", above=0.0),
+        as_number(move_seconds, "move_seconds", above=0.0),
         as_whole(rng, "rng", 0, 2**63),
     )
     check_executor(executor)
-    told = obeying(progress)
+    clock = Deadline.after(None if deadline is None else as_number(deadline, "deadline", above=0.0))
+    told = clock.checked_by(obeying(progress))
     for seam in sorted(listed, key=_slowest):
         check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
     is_free = as_choice(order, "order", ("free", "given")) == "free"
@@ -301,7 +308,16 @@ def plan_job(
             arm=arm_digest(robot),
         )
         make = partial(Work, asked, shelf, executor, told)
-        return _program(specification, make, ends, price, warm_start)
+        try:
+            return _program(specification, make, ends, price, warm_start)
+        except KeyboardInterrupt:
+            if not clock.passed:
+                raise
+            on = "give a folder= to go on from there" if folder is None else f"'{folder}' keeps it"
+            raise DeadlineError(
+                f"{robot.name}: the deadline of {deadline} s came before there was a program; of "
+                f"what was planned by then {on}: plan again, or allow more time"
+            ) from None
 
 
 def _program(

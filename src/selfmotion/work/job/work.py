@@ -65,8 +65,8 @@ class Asked:
     clearance : Clearance or None
     branches : int
         Motions in different branches for each seam.
-    deadline : float
-        For each move [s].
+    move_seconds : float
+        Of the processor, for each move [s].
     seed : int
     """
 
@@ -74,7 +74,7 @@ class Asked:
     constraints: tuple[Constraint, ...]
     clearance: Clearance | None
     branches: int
-    deadline: float
+    move_seconds: float
     seed: int
     _apart: dict[tuple[str, ...], Clearance] = field(default_factory=dict, repr=False)
 
@@ -207,7 +207,7 @@ class Work:
                     "arm": (self.asked.robot, self.asked.of_moves(standing)),
                     "named": name,
                     "ends": ends,
-                    "seconds": self.asked.deadline,
+                    "seconds": self.asked.move_seconds,
                     "seed": [self.asked.seed, _number(ends.tobytes())],
                     **({} if known is None else {"way": way_along(known.motion, ends)}),
                 }
