@@ -1,5 +1,6 @@
 """Places: what is found is no worse than a grid of places, each planned on its own."""
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from support.shell import invoke
 
 LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 WITHIN = {"x": (-0.3, 0.3), "y": (-0.4, 0.4)}
+# Out of reach of the planar arm [m].
+AWAY = pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0]))
 # A place may cost so much more than the best of a grid.
 NO_WORSE = 1.01
 
@@ -222,6 +225,30 @@ def test_of_the_present_place_a_quick_no_is_not_told(monkeypatch: pytest.MonkeyP
     found = sm.place(planar(), {"x": (-0.1, 0.1)})
     assert found.cost_before == pytest.approx(sm.plan(planar()).report.cost, rel=1e-3)
     assert "at the present place, " in str(found)
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_deadline_leaves_the_best_place_so_far(
+    monkeypatch: pytest.MonkeyPatch, elsewhere: bool
+) -> None:
+    now, told = [0.0], list[int]()
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+
+    def late(stage: str, done: int, total: int) -> None:
+        told.append(done)
+        now[0] = 2.0 if done > 3 else 0.0
+
+    with ThreadPoolExecutor(1) as executor:
+        given = {"executor": executor} if elsewhere else {}
+        early = sm.place(planar(), WITHIN, deadline=1.0, progress=late, **given)
+        assert told == ([told[0]] if elsewhere else [1, 2, 3, 4])
+        assert early.verified
+        costs = [item.cost for item in early.tried if np.isfinite(item.cost)]
+        assert early.cost == pytest.approx(min(costs), rel=NO_WORSE - 1.0)
+        now[0] = 0.0
+        far = planar().changed(path=sm.paths.Placed(planar().path, AWAY))
+        with pytest.raises(sm.errors.DeadlineError, match="any of [0-9]+ places"):
+            sm.place(far, {"x": (-0.1, 0.1)}, deadline=1.0, progress=late, **given)
 
 
 def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

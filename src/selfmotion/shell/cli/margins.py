@@ -264,6 +264,7 @@ def place(
     workers: Annotated[
         int | None, typer.Option(help="Processes; by default this one alone.", min=1)
     ] = None,
+    deadline: options.DeadlineOption = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -306,7 +307,7 @@ def place(
         display = stack.enter_context(StageDisplay(stages))
         if workers is not None:
             given["executor"] = stack.enter_context(processes(workers))
-        found = sm.place(problems, within, progress=display.stage, **given)
+        found = sm.place(problems, within, deadline=deadline, progress=display.stage, **given)
     terminal.print(str(found), markup=False, soft_wrap=True)
     for file in out or []:
         _write(found, file)

@@ -13,11 +13,13 @@ import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
+    DeadlineError,
     PlanError,
     ProblemError,
     Progress,
     as_called,
     as_choice,
+    as_number,
     as_numbers,
     as_several,
     check_executor,
@@ -25,7 +27,7 @@ from selfmotion.basics import (
     shown,
     silent,
 )
-from selfmotion.planning.planner import PlanRequest
+from selfmotion.planning.planner import Deadline, PlanRequest
 from selfmotion.problem.problem import Problem
 from selfmotion.work.batch import Item
 from selfmotion.work.placement.found import Placement, flat_along, on_bounds
@@ -51,6 +53,7 @@ def place(
     part: Sequence[str] | None = None,
     center: npt.ArrayLike | None = None,
     executor: Executor | None = None,
+    deadline: float | None = None,
     progress: Progress = silent,
 ) -> Placement:
     """Look for the place of the part, or of the arm's base, at which the motions cost least.
@@ -78,6 +81,9 @@ def place(
     executor : concurrent.futures.Executor, optional
         Where to plan: processes of this machine, or ``distributed.Client(…).get_executor()``. By
         default in this process.
+    deadline : float, optional
+        Time by the clock after which the best place so far is the result [s]; looked at after each
+        place, in other processes after several.
     progress : callable, optional
         Called with ``("places", done, 0)``.
 
@@ -87,6 +93,8 @@ def place(
 
     Raises
     ------
+    DeadlineError
+        The deadline came before there was a place with verified motions.
     PlanError
         No place that was tried has verified motions; says what stands against the one where it is,
         or another.
@@ -105,11 +113,25 @@ def place(
     about = None if center is None else as_numbers(center, "place: center", "(3,) [m]", (3,))
     listed = None if part is None else _names(part)
     places = places_of(several, of, listed, about, names)
-    run = _Here(places, box, progress) if executor is None else _There(places, box, executor)
+    clock = Deadline.after(None if deadline is None else as_number(deadline, "deadline", above=0.0))
+    told = clock.checked_by(progress)
+    run = _Here(places, box, told) if executor is None else _There(places, box, executor, told)
     # The present place is planned thoroughly: its cost is reported.
     here = np.zeros(len(names))
     known = [places.tried(here, thorough=True)] if box.holds(here) else []
-    best, tried = best_place(places, box, run.every, run.near, run.descents, known)
+    try:
+        best, tried = best_place(places, box, run.every, run.near, run.descents, known)
+    except KeyboardInterrupt:
+        if not clock.passed:
+            raise
+        tried = [*known, *run.tried]
+        sound = [item for item in tried if np.isfinite(item.cost)]
+        if not sound:
+            raise DeadlineError(
+                f"place: the deadline of {deadline} s came before there was a verified motion at "
+                f"any of {len(tried)} places; allow more time, or ask less"
+            ) from None
+        best = min(sound, key=lambda item: item.cost)
     if not np.isfinite(best.cost):
         raise PlanError(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
@@ -180,11 +202,12 @@ class _Here:
     """Plans in this process."""
 
     def __init__(self, places: Places, box: Box, progress: Progress) -> None:
-        self._places, self._box, self._progress, self._done = places, box, progress, 0
+        self._places, self._box, self._progress = places, box, progress
+        self.tried = list[Tried]()
 
-    def _tell(self, _: Tried) -> None:
-        self._done += 1
-        self._progress("places", self._done, 0)
+    def _tell(self, found: Tried) -> None:
+        self.tried.append(found)
+        self._progress("places", len(self.tried), 0)
 
     def every(self, wanted: Sequence[Array]) -> list[Tried]:
         """Plan at places, each on its own."""
@@ -214,18 +237,25 @@ class _Here:
 class _There:
     """Plans in other processes."""
 
-    def __init__(self, places: Places, box: Box, executor: Executor) -> None:
+    def __init__(self, places: Places, box: Box, executor: Executor, progress: Progress) -> None:
         tasks = [Item("place", lambda p=item: PlanRequest(p)).task for item in places.problems]  # type: ignore[misc]
         sent = described(places, [task["problem"] for task in tasks])
         self._modules = sorted({name for task in tasks for name in task["modules"]})
         self._sent, self._box, self._executor = json.dumps(sent), box, executor
+        self._progress = progress
+        self.tried = list[Tried]()
+
+    def _known(self, found: list[Tried]) -> list[Tried]:
+        self.tried += found
+        self._progress("places", len(self.tried), 0)
+        return found
 
     def every(self, wanted: Sequence[Array]) -> list[Tried]:
         """Plan at places, each on its own."""
         jobs = [
             self._executor.submit(_try_there, self._sent, self._modules, each) for each in wanted
         ]
-        return [job.result() for job in jobs]
+        return self._known([job.result() for job in jobs])
 
     def near(self, wanted: Sequence[tuple[Array, Tried]]) -> list[Tried]:
         """Plan at places, each from the motions of another one."""
@@ -233,7 +263,7 @@ class _There:
             self._executor.submit(_try_near, self._sent, self._modules, each, other.place)
             for each, other in wanted
         ]
-        return [job.result() for job in jobs]
+        return self._known([job.result() for job in jobs])
 
     def descents(self, begun: Sequence[Tried]) -> list[tuple[Tried, list[Tried]]]:
         """Go downhill from places."""
