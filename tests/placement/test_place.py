@@ -1,5 +1,6 @@
 """Places: what is found is no worse than a grid of places, each planned on its own."""
 
+import importlib
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,7 +16,7 @@ from selfmotion.work.placement import search
 from selfmotion.work.placement.places import Places, Tried, places_of
 from selfmotion.work.placement.search import Box, Descent, finalists
 from support.arms import robot_named
-from support.shell import invoke
+from support.shell import complaint, invoke
 
 LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 WITHIN = {"x": (-0.3, 0.3), "y": (-0.4, 0.4)}
@@ -23,6 +24,33 @@ WITHIN = {"x": (-0.3, 0.3), "y": (-0.4, 0.4)}
 AWAY = pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0]))
 # A place may cost so much more than the best of a grid.
 NO_WORSE = 1.01
+
+
+JOB = """
+task = "position"
+[robot]
+name = "panda"
+[clearance]
+distance = 0.005
+[[clearance.obstacles]]
+shape = "box"
+name = "wall"
+position = [0.95, 0.0, 0.5]
+size = [0.02, 1.0, 0.4]
+[workpiece]
+frame = { position = [0.45, 0.0, 0.3], rpy_deg = [180, 0, 0] }
+[[workpiece.obstacles]]
+shape = "box"
+name = "clamp"
+position = [0.0, 0.15, 0.1]
+size = [0.05, 0.05, 0.05]
+[[seams]]
+name = "there"
+path = { kind = "line", duration = 1.0, by = [0.1, 0, 0], start = { position = [0, 0.05, 0] } }
+[[seams]]
+name = "back"
+path = { kind = "line", duration = 1.0, by = [0.1, 0, 0], start = { position = [0, -0.05, 0] } }
+"""
 
 
 def planar() -> sm.Problem:
@@ -247,7 +275,7 @@ def test_a_deadline_leaves_the_best_place_so_far(
         assert early.cost == pytest.approx(min(costs), rel=NO_WORSE - 1.0)
         now[0] = 0.0
         far = planar().changed(path=sm.paths.Placed(planar().path, AWAY))
-        with pytest.raises(sm.errors.DeadlineError, match="any of [0-9]+ places"):
+        with pytest.raises(sm.errors.DeadlineError, match=r"any of \d+ places"):
             sm.place(far, {"x": (-0.1, 0.1)}, deadline=1.0, progress=late, **given)
 
 
@@ -299,6 +327,40 @@ def test_places_from_the_shell(tmp_path: Path) -> None:
         atol=1e-12,
     )
     assert "<svg" in page.read_text()
+
+
+def test_a_job_is_placed_as_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its file at the place says the same of every seam, moved; what is on the part goes along."""
+    (tmp_path / "job.toml").write_text(JOB)
+    out = tmp_path / "there.toml"
+    ranges = ("--x", "-0.05,0.05", "--y", "-0.05,0.05")
+
+    def one_place(places: Places, *_: object) -> tuple[Tried, list[Tried]]:
+        found = places.tried(np.array([0.02, 0.01]))
+        return found, [found]
+
+    monkeypatch.setattr(
+        importlib.import_module("selfmotion.work.placement.place"), "best_place", one_place
+    )
+    code, text = invoke("place", tmp_path / "job.toml", *ranges, "--out", out)
+    assert code == 0, text
+    here, there = (sm.files.read_seam_job(file) for file in (tmp_path / "job.toml", out))
+    by = there.seams[0].path.pose(0.0) * here.seams[0].path.pose(0.0).inverse()
+    np.testing.assert_allclose(by.translation, [0.02, 0.01, 0.0], atol=1e-12)
+    for before, after in zip(here.problems, there.problems, strict=True):
+        np.testing.assert_allclose(
+            after.path.pose(0.3).homogeneous, (by * before.path.pose(0.3)).homogeneous, atol=1e-12
+        )
+        bodies = [
+            {item.name: item.pose.translation for item in problem.clearance.obstacles}
+            for problem in (before, after)
+        ]
+        np.testing.assert_allclose(bodies[1]["clamp"], by.act(bodies[0]["clamp"]), atol=1e-12)
+        np.testing.assert_array_equal(bodies[1]["wall"], bodies[0]["wall"])
+    elsewhere = complaint(
+        "place", tmp_path / "job.toml", *ranges, "--out", tmp_path.parent / "a.toml"
+    )
+    assert "beside" in elsewhere
 
 
 def test_directions_of_the_world_stay_where_the_base_is_tilted() -> None:

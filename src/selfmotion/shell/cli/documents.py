@@ -332,10 +332,16 @@ def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
     )
 
 
-def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.SeamJob:
-    """Return the job of a file with seams."""
+def document_of(file: Path, settings: list[str]) -> dict[str, Any]:
+    """Return what a file says, with what is set besides."""
     document = read_document(file)
     _set(document, settings)
+    return document
+
+
+def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.SeamJob:
+    """Return the job of a file with seams."""
+    document = document_of(file, settings)
     job = seam_job_of(document, file, allow_code=allow_code)
     # A file with code of its own is not read twice for this.
     if not allow_code:

@@ -1,7 +1,7 @@
 """The commands about a cell: how wrong it may be, and where to put the part."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 import selfmotion as sm
+from selfmotion.basics import write_document
 from selfmotion.shell.cli import checks, documents, options, outputs
 from selfmotion.shell.cli.app import (
     LOOK,
@@ -23,6 +24,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
+from selfmotion.shell.documents import belonging, moved_workpiece
 from selfmotion.work.batch import processes
 
 # The commands that say how wrong a cell may be.
@@ -280,7 +282,11 @@ def place(
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
 ) -> None:
-    """Find the place of the part, or of the arm, at which the motions cost least."""
+    """Find the place of the part, or of the arm, at which the motions cost least.
+
+    Of a job all seams are placed together, and a job file is written. What stands in the frame of
+    a file's workpiece belongs to the part.
+    """
     if part and path_alone:
         raise sm.errors.ProblemError(
             "--part and --path-alone say different things; give one of them"
@@ -291,7 +297,17 @@ def place(
             raise sm.errors.FileFormatError(
                 f"{file}: expected a name that ends in {', '.join(known)}"
             )
-    problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
+    read = [documents.document_of(file, settings or []) for file in files]
+    jobs = [file for file, document in zip(files, read, strict=True) if "seams" in document]
+    if jobs and len(files) > 1:
+        raise sm.errors.ProblemError(f"{jobs[0]}: is a job of many seams; give it alone")
+    if jobs:
+        job = documents.seams_of_file(jobs[0], settings or [], allow_code)
+        problems = list(job.problems)
+        _check_placed_jobs(jobs[0], out or [], base)
+    else:
+        problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
+    known_parts = [names for names in map(belonging, read) if names is not None]
     named = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
     within = {
         name: options.numbers(text, f"--{name}", 2)
@@ -301,6 +317,8 @@ def place(
     given: dict[str, Any] = {"of": "base" if base else "part"}
     if part or path_alone:
         given["part"] = part or ()
+    elif known_parts and not base:
+        given["part"] = sorted({name for names in known_parts for name in names})
     if center is not None:
         given["center"] = options.numbers(center, "--center", 3)
     with ExitStack() as stack:
@@ -310,7 +328,11 @@ def place(
         found = sm.place(problems, within, deadline=deadline, progress=display.stage, **given)
     terminal.print(str(found), markup=False, soft_wrap=True)
     for file in out or []:
-        _write(found, file)
+        if jobs:
+            write_document(file, moved_workpiece(read[0], found.displacement))
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+        else:
+            _write(found, file)
     if drawn:
         pictured = found.map(points=points) if len(within) > 1 else None
         for file in drawn:
@@ -357,6 +379,21 @@ def plan_margin(
     terminal.print(str(found), markup=False, soft_wrap=True)
     outputs.write(found.plan, out or [], None, terminal, quiet=False)
     raise typer.Exit(VERIFIED if found.reached else NOT_VERIFIED)
+
+
+def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
+    """Raise where a job at its place cannot be written."""
+    for file in out:
+        if base:
+            raise sm.errors.ProblemError(
+                f"{file}: a job whose arm's base is moved is not written; set robot.base to the "
+                f"place that is found"
+            )
+        if file.suffix not in _PROBLEMS or file.resolve().parent != job.resolve().parent:
+            raise sm.errors.FileFormatError(
+                f"{file}: expected a job file ({', '.join(_PROBLEMS)}) beside {job}, whose files "
+                f"it names"
+            )
 
 
 def _write(found: sm.placement.Placement, file: Path) -> None:

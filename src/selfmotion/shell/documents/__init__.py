@@ -22,6 +22,8 @@ from selfmotion.shell.documents.problem_file import (
     read_problem as read_problem,
 )
 from selfmotion.shell.documents.problem_parts import (
+    belonging as belonging,
+    moved_workpiece as moved_workpiece,
     obstacle as obstacle,
     path_of as path_of,
 )

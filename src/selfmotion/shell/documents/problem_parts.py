@@ -421,6 +421,26 @@ def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[st
     return {**table, "clearance": {"distance": 0.0, **clearance, "obstacles": several}}
 
 
+def belonging(document: Mapping[str, Any]) -> tuple[str, ...] | None:
+    """Return the names of bodies that belong to the workpiece of a document; None without one."""
+    piece = document.get(NAME)
+    if not isinstance(piece, Mapping):
+        return None
+    names = [str(item.get("name")) for item in piece.get("obstacles", [])]
+    return (*names, *([NAME] if "mesh" in piece else []))
+
+
+def moved_workpiece(document: Mapping[str, Any], by: SE3) -> dict[str, Any]:
+    """Return a document whose workpiece is moved in the world, with all that is in its frame.
+
+    One without a workpiece gets one, in which its paths are.
+    """
+    place = by * standing(document)[0]
+    piece = dict(document.get(NAME, {}))
+    frame = {"position": place.translation.tolist(), "rotation": place.rotation.tolist()}
+    return {**document, NAME: {**piece, "frame": frame}}
+
+
 def standing(document: Mapping[str, Any]) -> tuple[SE3, str | None]:
     """Return where the workpiece of a document stands that was read before, and on what."""
     piece = document.get(NAME, {})

@@ -98,24 +98,32 @@ class SeamJob:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What to know before planning: see `Problem.remarks`; of several seams the first's."""
-        clearance, kept = self.settings.get("clearance"), self.settings["constraints"]
         found: dict[str, str] = {}
         for seam in self.seams:
-            asked = (*kept, *seam.constraints, *([] if clearance is None else [clearance]))
             try:
-                problem = Problem(
-                    self.robot,
-                    seam.path,
-                    seam.task,
-                    constraints=asked,
-                    relaxations=seam.relaxations,
-                )
+                problem = self._problem(seam)
             except SelfmotionError:
                 # It is told why when the seam is planned.
                 continue
             for remark in problem.remarks:
                 found.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
         return (*self.notes, *found.values())
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """The problem of each seam alone, without what others leave behind."""
+        return tuple(map(self._problem, self.seams))
+
+    def _problem(self, seam: Seam) -> Problem:
+        found = Problem(
+            self.robot,
+            seam.path,
+            seam.task,
+            constraints=(*self.settings["constraints"], *seam.constraints),
+            relaxations=tuple(seam.relaxations),
+            clearance=self.settings.get("clearance", NO_OVERLAP),
+        )
+        return found if seam.costs is None else replace(found, costs=tuple(seam.costs))
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.
