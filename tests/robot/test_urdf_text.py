@@ -262,8 +262,9 @@ def test_an_inertial_that_lacks_something_is_missed_only_by_torques(
     text = arm(f"<inertial>{inertial}</inertial>")
     file.write_text(text.replace('name="l5">', f'name="l5"><inertial>{whole}</inertial>'))
     robot = sm.load_robot(file)
-    (note,) = robot.urdf.notes
+    note, tool = robot.urdf.notes
     assert note.startswith("link 'l4': ")
+    assert tool.startswith("the tool is '")
     path = sm.paths.Line(robot.pose(np.full(7, 0.3)), robot.pose(np.full(7, 0.31)), 1.0)
     problem = sm.Problem(robot, path, "pose", np.full(7, 0.3))
     assert note in problem.remarks

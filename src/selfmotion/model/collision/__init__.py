@@ -35,5 +35,6 @@ from selfmotion.model.collision.pairs import (
     disabled_links as disabled_links,
     how_near as how_near,
     srdf_line as srdf_line,
+    srdf_notes as srdf_notes,
 )
 from selfmotion.model.collision.solids import Solid as Solid

@@ -35,6 +35,7 @@ from selfmotion.model.robot.urdf_text import (
     parsed_by_yourdfpy,
     root_of,
 )
+from selfmotion.model.robot.urdf_unsaid import axes_unsaid, limits_passed_over
 
 # Fixed joint of a placed base.
 BASE_JOINT = "base_placement"
@@ -122,7 +123,7 @@ class Urdf:
     parts : tuple of UrdfPart
         Its parts; empty for a single robot, or one from a saved plan.
     notes : tuple of str
-        Elements that are not drawn or weighed, and causes.
+        Elements that are not drawn, weighed or read, and what is taken where it says nothing.
     packages : tuple of str
         Folders of packages that the user named.
     lacking_efforts : tuple of str
@@ -323,6 +324,7 @@ def parse_urdf(
     for told in root.findall("gazebo"):
         root.remove(told)
     notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]
+    notes += [*axes_unsaid(root), *limits_passed_over(root)]
     unsaid = without_limits(root)
     for key, what in (("velocity", "speeds are"), ("effort", "torques are")):
         if unsaid[key]:

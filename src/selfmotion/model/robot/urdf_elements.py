@@ -178,9 +178,10 @@ def split_planar(root: ElementTree.Element, source: str) -> list[str]:
             root.insert(at + k, one)
             if k < 2:
                 root.append(ElementTree.Element("link", name=part))
+        plane = "; no <axis>, its plane is that of x and y" if axis is None else ""
         notes.append(
             f"joint '{name}' is planar: read as {', '.join(parts)}; its limits are those of the "
-            f"first two, the turn has none"
+            f"first two, the turn has none{plane}"
         )
     return notes
 

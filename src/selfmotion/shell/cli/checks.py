@@ -11,10 +11,11 @@ import typer
 import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
+from selfmotion.model.collision import srdf_notes
 from selfmotion.problem.problem import KEPT, NO_OVERLAP
 from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
-from selfmotion.shell.documents import read_joint_limits
+from selfmotion.shell.documents import joint_limit_notes, read_joint_limits
 from selfmotion.shop import controllers
 
 _Near = Mapping[str, Extreme]
@@ -107,6 +108,24 @@ def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.Robot
             )
             stages.print(text, markup=False, soft_wrap=True)
     return Read(motion, within, program)
+
+
+def notes_of(
+    file: Path,
+    degrees: bool,
+    robot: sm.RobotModel,
+    joint_limits: Path | None,
+    obstacles: Path | None,
+    srdf: Path | None,
+) -> tuple[str, ...]:
+    """Return what is taken for granted, or passed over, of the files of a check."""
+    bodies = () if obstacles is None else options.read_obstacles(obstacles)
+    return (
+        *([] if is_program(file) else controllers.motion_notes(file, degrees=degrees)),
+        *([] if joint_limits is None else joint_limit_notes(joint_limits, robot)),
+        *([] if srdf is None else srdf_notes(srdf)),
+        *(body.note for body in bodies if isinstance(body, sm.obstacles.Mesh) and body.note),
+    )
 
 
 def is_program(file: Path) -> bool:

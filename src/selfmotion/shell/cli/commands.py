@@ -62,7 +62,7 @@ def plan(
         "search": options.search_of(search, compare, job.search),
     }
     given = {key: value for key, value in asked.items() if value is not None}
-    remarks = job.problem.remarks
+    remarks = job.remarks
     outputs.tell(remarks)
     job.check_used(job.goal)
     if job.goal == "parts":
@@ -192,7 +192,7 @@ def check(
         options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")
         checks.of_program(file, Path(robot), within, as_json, verbose)
-    program = None
+    program, notes = None, list[str]()
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
@@ -205,6 +205,7 @@ def check(
             certificate, near, arm, program = checks.of_problem(
                 file, robot, degrees, within, judged, display.stage, calibration
             )
+            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
         else:
             if robot is None or path is None:
                 raise sm.errors.ProblemError(
@@ -239,8 +240,12 @@ def check(
             )
             certificate = checks.with_failures(certificate, found.besides(arm, ()))
             near = checks.near(arm, motion, asked)
+            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
+            notes += [*arm.urdf.notes, *followed.notes]
+    outputs.tell(notes)
     if as_json:
         data = summaries.certificate_json(certificate, near)
+        data["remarks"] = [*notes, *data["remarks"]]
         print_json(data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
@@ -403,7 +408,7 @@ def fastest(
         pairs = [_factor(text) for text in keep]
         options.refuse_twice("--keep", [kind for kind, _ in pairs])
         given["keep"] = {**(job.keep or {}), **dict(pairs)}
-    remarks = job.problem.remarks
+    remarks = job.remarks
     outputs.tell(remarks)
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:

@@ -182,7 +182,7 @@ def finish_parts(
             )
     with StageDisplay(stages) as display:
         found = job.in_parts(progress=display.stage)
-    _show_parts(found, as_json, verbose, job.problem.remarks)
+    _show_parts(found, as_json, verbose, job.remarks)
     for file in wanted:
         unsound = outputs.left_out(found)
         if unsound and outputs.is_motion(file):

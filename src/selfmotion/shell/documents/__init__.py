@@ -8,6 +8,7 @@ from selfmotion.shell.documents.example import (
 )
 from selfmotion.shell.documents.grid_items import grid_items as grid_items
 from selfmotion.shell.documents.joint_limits import (
+    joint_limit_notes as joint_limit_notes,
     read_joint_limits as read_joint_limits,
 )
 from selfmotion.shell.documents.overrides import (

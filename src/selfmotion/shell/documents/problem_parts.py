@@ -173,6 +173,7 @@ def path_of(
         case "file":
             del values["kind"]
             path: Path = read_path(beside(values.pop("file")), **values)
+            path = path if frame is not None else in_reference(path, robot)
         case "circle":
             path = _circle(values)
         case "line":
@@ -186,6 +187,13 @@ def path_of(
     path = path if weave is None else woven(path, weave)
     path = path if leads is None else led(path, leads)
     return path if frame is None else Placed(path, frame)
+
+
+def in_reference(path: Path, robot: RobotModel) -> Path:
+    """Return a path of a file with a note of the frame that its places are taken to be in."""
+    frame = f"'{robot.urdf.root}', the arm's root" if robot.reference is None else robot.reference
+    return path.noted((*path.notes, f"no frame is given: places of the file are in that of {frame}"
+                                    f" (else: frame, --frame)"))  # fmt: skip
 
 
 def led(path: Path, values: Mapping[str, Any]) -> Path:

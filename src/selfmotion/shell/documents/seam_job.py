@@ -27,6 +27,7 @@ from selfmotion.shell.documents.problem_file import job_of
 from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
+    in_reference,
     led,
     obstacle,
     own_rapids,
@@ -77,6 +78,8 @@ class SeamJob:
         How fast that may be at most [m/s].
     unjudged : tuple of str
         What nothing is asked of, as of files of machine tools; programs say it.
+    notes : tuple of str
+        As of `PlanRequest`.
     """
 
     robot: RobotModel
@@ -85,6 +88,7 @@ class SeamJob:
     at_feed: Callable[[float], "SeamJob"] | None = None
     most_feed: float = FASTEST_FEED
     unjudged: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -106,7 +110,7 @@ class SeamJob:
                 continue
             for remark in problem.remarks:
                 found.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
-        return tuple(found.values())
+        return (*self.notes, *found.values())
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.
@@ -194,6 +198,7 @@ def seam_job_of(
         tuple(seams),
         {**options, "constraints": kept},
         unjudged=(UNJUDGED,) if is_cut else (),
+        notes=whole.notes,
     )
 
 
@@ -320,6 +325,8 @@ class _Reader:
             place = self._standing[0] if frame is None else self._standing[0] * frame
             if frame is not None or NAME in self._shared:
                 path = Placed(path, place)
+            else:
+                path = in_reference(path, self.first.problem.robot)
             found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
 

@@ -182,6 +182,7 @@ class _Reader:
                 self._ahead = self._axes @ self._numbers(word, given, 3)
             case "TLAXIS":
                 self._axis = self._direction(self._numbers(word, given, 3).tolist())
+                machine.says_axis = True
             case "RAPID" if not rest:
                 self._rapid = True
             case "FEDRAT":
@@ -314,7 +315,7 @@ class _Reader:
             position = position - self._origin + machine.position
         axis = machine.axis if self._axis is None else self._axis
         if len(values) == 6:
-            axis = self._direction(values[3:])
+            axis, machine.says_axis = self._direction(values[3:]), True
         travels = word in ("FROM", "GOHOME")
         if self._cycle and not travels:
             self._drill(position, axis)

@@ -27,6 +27,11 @@ STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 _SIEMENS = ".mpf"
 # Remark on what no program of a machine tool states.
 UNJUDGED = "stock and engagement are not judged"
+# Note on a file that does not say how the tool stands.
+UPRIGHT = (
+    "nothing says how the tool stands: its z axis points down, against that of the file, and "
+    "places are those of its tip"
+)
 _FREE = (
     "only rapids along the tool's axis are made as the file has them, all others are free motions; "
     "let CAM write retracts and approaches along the axis"
@@ -156,6 +161,8 @@ class Machine:
         self.feed = 0.0
         self.cuts: list[Cut] = []
         self.notes: list[str] = []
+        # Whether the file says how the tool stands.
+        self.says_axis = False
         # The cut that is read, or the rapids that lead to one; what happens before the next.
         self._open: Cut | None = None
         self._next: list[str] = []
@@ -356,7 +363,8 @@ class Machine:
         self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
-        notes = (*self.notes, UNJUDGED)
+        unsaid = () if self.says_axis else (UPRIGHT,)
+        notes = (*self.notes, *unsaid, UNJUDGED)
         rows = (replace(cut.rows(), one_way=True, notes=notes) for cut in moved)
         return {f"cut {number}": each for number, each in enumerate(rows, 1)}
 

@@ -130,6 +130,7 @@ def read_drawing(
     kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(beside.items()))
     layers_off = ", ".join(f"'{name}'" for name in hidden)
     notes = (
+        "the tool's z axis points down, against that of the drawing",
         *([f"passed over: {kinds}"] if beside else []),
         *([f"passed over: layers that are off or frozen: {layers_off}"] if hidden else []),
     )

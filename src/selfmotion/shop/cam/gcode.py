@@ -93,6 +93,16 @@ _GROUPS: tuple[Collection[str], ...] = (
     ("M82", "M83"),
 )
 _AXES = "XYZABC"
+# Modes that no line may say: the words that would, what has to be in the program for the mode to
+# count, and what is taken.
+_UNSAID = (
+    (("G20", "G21"), "", "lengths are taken for mm"),
+    (("G90", "G91"), "", "places are taken for absolute ones"),
+    (("G93", "G94"), "feed", "F is taken for a length by the minute"),
+    (("G17", "G18", "G19"), "arc", "arcs are taken to lie in the plane of X and Y"),
+    (("G98", "G99"), "hole", "holes are left as high as where they were come to"),
+    (("M82", "M83"), "material", "E is taken to count from the start"),
+)
 
 
 def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, PoseRows]:
@@ -137,15 +147,22 @@ class _Reader:
         self._hole: dict[str, float] = {}
         # How far material is fed, and whether words say so from the start.
         self._fed, self._fed_from_start = 0.0, True
-        # What S said on the line of a cut; the first tool; whether a unit is said.
+        # What S said on the line of a cut; the first tool.
         self._power: float | None = None
         self._tool: float | None = None
-        self._says_unit = False
+        # The words G and M of all lines, and what the program has of that a mode counts for.
+        self._said: set[str] = set()
+        self._has: set[str] = {""}
 
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts by names."""
-        if not (self._says_unit or self._prints):
-            self.machine.notes.append("no line says G20 or G21: lengths are taken for mm")
+        unsaid = [
+            f"{', '.join(words[:-1])} or {words[-1]}: {taken}"
+            for words, of, taken in _UNSAID
+            if of in self._has and self._said.isdisjoint(words)
+        ]
+        if unsaid:
+            self.machine.notes.append(f"no line says {'; '.join(unsaid)}")
         return self.machine.seams()
 
     def stay_flat(self) -> None:
@@ -170,6 +187,7 @@ class _Reader:
             return False
         words = words_of(text, machine)
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
+        self._said.update(codes)
         for group in _GROUPS:
             said = [code for code in codes if code in group]
             if len(said) > 1:
@@ -268,7 +286,7 @@ class _Reader:
     def _mode(self, code: str) -> None:
         match code:
             case "G20" | "G21":
-                self._unit, self._says_unit = _INCH if code == "G20" else _MM, True
+                self._unit = _INCH if code == "G20" else _MM
             case "G90" | "G91":
                 self._absolute = code == "G90"
             case "G93" | "G94":
@@ -325,6 +343,7 @@ class _Reader:
         if code in _REASONS:
             raise self.machine.fault(f"{code}: {_REASONS[code]}")
         if code in ("M82", "M83"):
+            self._said.add(code)
             self._fed_from_start = code == "M82"
         elif code not in ("", "%"):
             self.machine.happens(code)
@@ -374,6 +393,7 @@ class _Reader:
         """Return how much material a line feeds: by differences after M83, and after G91, too."""
         if "E" not in values:
             return 0.0
+        self._has.add("material")
         # So do Marlin and Klipper; G90 leaves what M82 and M83 said (Klipper).
         if self._fed_from_start and self._absolute:
             fed, self._fed = values["E"] - self._fed, values["E"]
@@ -389,6 +409,7 @@ class _Reader:
     def _drill(self, values: Mapping[str, float]) -> None:
         """Drill a hole of the cycle, where X or Y is given."""
         machine = self.machine
+        self._has.add("hole")
         self._take_feed(values)
         if self._plane != _PLANES["G17"]:
             raise machine.fault(f"{self._cycle} drills along Z: say G17")
@@ -442,6 +463,7 @@ class _Reader:
 
     def _take_feed(self, values: Mapping[str, float]) -> None:
         if "F" in values:
+            self._has.add("feed")
             if not 0.0 < values["F"] < 1e7:
                 raise self.machine.fault(f"F is {values['F']:g}, expected a feed above 0")
             scale = 1.0 if self._inverse_time else self._unit
@@ -460,6 +482,10 @@ class _Reader:
             if fed > 0.0:
                 machine.happens(PRIME)
             return
+        if self._said.isdisjoint(_MOTIONS):
+            machine.note("neither this line nor one before says G0, G1, G2 or G3: it is a rapid")
+        if arc:
+            self._has.add("arc")
         before, start = dict(self._turns), self._at.copy()
         goal = self._at.copy()
         for k, name in enumerate("XYZ"):
@@ -530,6 +556,8 @@ class _Reader:
                 before = 0.0 if self._absolute else self._turns.get(name, 0.0)
                 self._turns[name] = np.radians(values[name]) + before
         given = [name for name in "IJK" if name in values]
+        if (given and not arc) or any(name in values for name in "ABC"):
+            self.machine.says_axis = True
         if given and not arc:
             if len(given) < 3 or any(name in values for name in "ABC"):
                 raise self.machine.fault("a tool axis is I, J and K, all three, and not A, B, C")

@@ -329,6 +329,7 @@ def rows_of_table(
 
 # Columns without a unit → the unit that is taken, and the ending for another one.
 _TAKEN = {
+    "t": ("seconds", ""),
     **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
     "feed": ("m/s", "feed_mm"),
     **dict.fromkeys(("roll", "pitch", "yaw"), ("radians about fixed axes", "roll_deg")),
@@ -345,7 +346,8 @@ def _unsaid(titles: Sequence[str]) -> tuple[str, ...]:
     if not bare:
         return ()
     columns = "; ".join(
-        f"{','.join(names)} for {taken} (else: {others})" for (taken, others), names in bare.items()
+        f"{','.join(names)} for {taken}{f' (else: {others})' if others else ''}"
+        for (taken, others), names in bare.items()
     )
     return (f"columns say no unit and are taken so: {columns}",)
 
@@ -449,7 +451,9 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
         raise FileFormatError(f"{file}: holds no array of numbers")
     places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return PoseRows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
+        rotations = array[:, :3, :3] * 1.0
+        rows = PoseRows(places, array[:, :3, 3] * 1.0, "rotation", rotations, None)
+        return replace(rows, notes=(MATRIX_NOTE,))
     if array.ndim != 2:
         raise FileFormatError(
             f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or a table (N, C)"
@@ -470,6 +474,10 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
     chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
     numbers = array[:, chosen] * 1.0
     return rows_of_table(file, [columns[k] for k in chosen], numbers, places, {})
+
+
+# Note on 4 x 4 matrices, which say no unit.
+MATRIX_NOTE = "matrices say no unit: their last columns are taken for metres"
 
 
 # Names of a list of messages.
@@ -518,6 +526,8 @@ def _frames(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
             f"{file}: has poses in frame '{first}' and in '{second}', expected one: transform them "
             f"into the same, whose place is told by a frame (--frame)"
         )
+    if not frames:
+        return ("ROS: poses in metres, in no frame that is named",)
     return tuple(
         f"ROS: poses in metres in frame '{name}', which is taken for the root of the arm, or for "
         f"what frame (--frame) says"

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import FileFormatError, is_number, read_values, shown
-from selfmotion.shop.cam.path_rows import READERS, PoseRows, Reading, named, rows_of_table
+from selfmotion.shop.cam.path_rows import (
+    MATRIX_NOTE,
+    READERS,
+    PoseRows,
+    Reading,
+    named,
+    rows_of_table,
+)
 from selfmotion.shop.cam.peers import compas_poses
 
 # Names of lists of poses.
@@ -63,7 +70,7 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
         matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
                              for place, item in found])  # fmt: skip
         rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
-        return {"": replace(rows, notes=notes)}
+        return {"": replace(rows, notes=(MATRIX_NOTE, *notes))}
     for place, item in found:
         if not isinstance(item, Mapping):
             raise FileFormatError(f"{file}: {place}: is a matrix among poses of another form")
@@ -72,6 +79,7 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
         notes += _passed_over(
             file, place, {key: item for each in unread for key, item in each.items()}
         )
+        notes += _angles_beside(place, item)
     flat = [dict(_numbers_of(file, place, item)) for place, item in found]
     for place, row in zip(places, flat, strict=True):
         if set(row) != set(flat[0]):
@@ -85,6 +93,16 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     # A note on keys that every pose has names the first pose.
     first = {note.partition(": ")[2]: note for note in reversed(notes)}
     return {"": replace(rows, notes=(*rows.notes, *reversed(first.values())))}
+
+
+def _angles_beside(place: str, item: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note of angles that stand beside a quaternion, which is what is read."""
+    inner = item.get("pose")
+    given = {*item, *(inner if isinstance(inner, Mapping) else ())}
+    angles, turns = given.intersection(_ANGLES), given.intersection(_QUATERNIONS)
+    if not (angles and turns):
+        return ()
+    return (f"{place}: '{min(angles)}' is passed over beside '{min(turns)}'",)
 
 
 def _unread(item: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from selfmotion.shop.controllers.motions import (
     MESSAGES as MESSAGES,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
+    motion_notes as motion_notes,
     motion_of_program as motion_of_program,
     read_motion as read_motion,
     read_parts as read_parts,
