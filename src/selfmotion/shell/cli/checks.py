@@ -206,8 +206,18 @@ def of_problem(
 
     And the program that it is.
     """
-    problem, tolerance, ending = _asked_by(Path(asked), progress)
+    problem, tolerance, ending, plan = _asked_by(Path(asked), progress)
     given = read(file, degrees, within, problem.robot)
+    if plan is not None and given.program is None:
+        slower = controllers.slowed_as(plan, given.motion)
+        if slower is not plan:
+            times = slower.trajectory.duration / plan.trajectory.duration
+            text = (
+                f"note: judged by the plan as slow as its samples at this rate need, {times:.4f} "
+                f"times as long, as export --rate writes it"
+            )
+            stages.print(text, markup=False, soft_wrap=True)
+            problem = slower.problem
     motions, program = given.ways(problem.path, problem.robot), given.program
     against = given.besides(problem.robot, problem.constraints)
     if program is not None:
@@ -236,13 +246,18 @@ def of_problem(
     return certificate, close, robot, program
 
 
-def _asked_by(file: Path, progress: Progress) -> tuple[sm.Problem, sm.Tolerance | None, str]:
-    """Return the problem of a problem file or of a kept plan, its tolerance, how that ended."""
+def _asked_by(
+    file: Path, progress: Progress
+) -> tuple[sm.Problem, sm.Tolerance | None, str, sm.Plan | None]:
+    """Return the problem of a problem file or of a saved plan, its tolerance, how that ended.
+
+    And the plan, where it is one.
+    """
     if file.suffix == ".npz":
         plan = sm.load_plan(file, progress=progress)
-        return plan.problem, plan.tolerance, plan.report.ending
+        return plan.problem, plan.tolerance, plan.report.ending, plan
     job = sm.files.read_job(file)
-    return job.problem, job.tolerance, ""
+    return job.problem, job.tolerance, "", None
 
 
 def near(

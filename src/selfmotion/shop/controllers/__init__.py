@@ -50,6 +50,7 @@ from selfmotion.shop.controllers.samples import (
     coarsest_rate as coarsest_rate,
     linear_miss as linear_miss,
     moving_ends as moving_ends,
+    slowed_as as slowed_as,
     within_limits_at as within_limits_at,
 )
 from selfmotion.shop.controllers.thinning import (

@@ -15,6 +15,8 @@ from selfmotion.work.job import Program
 
 # Decimals of times in messages [s]: whole nanoseconds.
 _DIGITS = 9
+# Difference of times that are written alike: two roundings to whole nanoseconds [s].
+_UNEVEN = 2.1e-9
 # Smallest number of samples of a motion.
 _FEWEST = 4
 # Shares of an interval at which straight lines are compared with the motion.
@@ -194,6 +196,21 @@ def within_limits_at(plan: Plan, rate: float | None) -> Plan:
         return plan
     slower = at_rate(plan, rate)
     return slower if slower.certificate.verified else plan
+
+
+def slowed_as(plan: Plan, motion: Trajectory) -> Plan:
+    """Return a retimed plan as slow as a motion that `within_limits_at` made of it.
+
+    The rate is that of the motion's samples. Any other plan is returned as it is, and so is one of
+    which the motion is not made so.
+    """
+    steps = np.diff(motion.t)
+    is_even = np.ptp(steps) <= _UNEVEN
+    if not (is_retimed(plan) and is_even and motion.duration > plan.trajectory.duration + _UNEVEN):
+        return plan
+    slower = within_limits_at(plan, len(steps) / motion.duration)
+    is_same = abs(slower.trajectory.duration - motion.duration) <= _UNEVEN
+    return slower if is_same else plan
 
 
 def for_cubics(motion: Trajectory) -> Trajectory:
