@@ -163,6 +163,22 @@ def test_a_limit_without_effort_or_speed_is_none(tmp_path: Path) -> None:
             sm.constraints.JointTorqueLimits().of(robot)
 
 
+@pytest.mark.parametrize(
+    ("limit", "note"),
+    [
+        ('lower="-2" upper="2" velocity="0" effort="0"', "'j1': <limit> with velocity 0: taken"),
+        ('lower="-2" upper="2" effort="9"', "'j1': <limit> without velocity: taken for none"),
+        ('lower="-115" upper="115" velocity="2" effort="9"', "'j1': <limit> of more than 20 rad"),
+    ],
+)
+def test_a_limit_of_zero_or_in_degrees_is_told(limit: str, note: str) -> None:
+    text = (CASES / "limit_without_effort" / "with_effort.urdf").read_text()
+    joint = re.compile(r'(name="j1" type=")\w+(".*?)<limit[^>]*/>', re.DOTALL)
+    given = joint.sub(rf"\1revolute\2<limit {limit}/>", text, count=1)
+    assert given != text
+    assert any(said.startswith(note) for said in sm.load_robot(given).urdf.notes)
+
+
 def test_a_planar_joint_with_limits_is_three_joints(tmp_path: Path) -> None:
     folder = CASES / "planar_base"
     text = (folder / "planar_base.urdf").read_text()
@@ -413,6 +429,46 @@ def test_what_peers_write_besides_is_refused(
     (tmp_path / name).write_text(text)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(tmp_path / name, feed=0.05)
+
+
+_FRAMES = [{"point": [0.45, y, 0.35], "xaxis": [1, 0, 0], "yaxis": [0, -1, 0]}
+           for y in (-0.05, 0.0, 0.05)]  # fmt: skip
+# Of the forms above, written otherwise: name, text, places [mm], and the note.
+ALSO = [
+    ("semicolons.csv", "x;y;z;rz1;ry;rz2;velocity\n0;0;0;0;180;0;20\n40;0;0;90;180;0;20\n",
+     [[0, 0, 0], [40, 0, 0]], "IRBCAM: "),
+    ("numbered.csv", "index,x,y,z,rz1,ry,rz2\n1,0,0,5,0,180,0\n2,0,30,5,0,180,0\n",
+     [[0, 0, 5], [0, 30, 5]], "passed over: index"),
+    ("commas.csv", "X 10,5; Y 0,0; Z 3,25; A 180,0\nX 30,5; Y -4,0; Z 3,25; A 180,0\n",
+     [[10.5, 0, 3.25], [30.5, -4, 3.25]], "igus: "),
+    ("small.csv", "x 1.5 ; y 2 ; z 3\nx 9 ; y 2 ; z 3\n\n", [[1.5, 2, 3], [9, 2, 3]], "igus: "),
+    ("dump.json", json.dumps({"dtype": "compas.data/List", "data": _FRAMES}),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "compas: points in metres, as compas_fab"),
+    ("named.json", json.dumps({"frames": _FRAMES, "speed": 3}),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "passed over: 'speed'"),
+    ("typed.json", json.dumps([{"dtype": "compas.geometry/Frame", "data": one} for one in _FRAMES]),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "compas: "),
+    ("caps.csv", "Breakpoints,Primitives,Points\n0,moveJ,\"[array([1., 2., 3.])]\"\n"
+     '9,moveL,"[array([1.,\n  8., 3.])]"\n', [[1, 2, 3], [1, 8, 3]], "motion primitives: "),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ALSO, ids=lambda form: form[0])
+def test_forms_of_peers_that_are_written_otherwise(
+    form: tuple[str, str, list[list[float]], str], tmp_path: Path
+) -> None:
+    name, text, places, note = form
+    (tmp_path / name).write_text(text)
+    rows = one_seam(tmp_path / name, None, Reading())
+    np.testing.assert_allclose(1e3 * rows.positions, places, atol=DIGITS)
+    assert note in "\n".join(rows.notes)
+
+
+def test_frames_in_millimetres_are_refused_by_their_form(tmp_path: Path) -> None:
+    far = [{**frame, "point": [450, k, 350]} for k, frame in enumerate(_FRAMES)]
+    (tmp_path / "mm.json").write_text(json.dumps(far))
+    said = complaint("plan", "panda", "--path", tmp_path / "mm.json", "--feed", "0.1")
+    assert "write its places in the unit of its form, or as a table with x_mm,y_mm,z_mm" in said
 
 
 ARCS = {

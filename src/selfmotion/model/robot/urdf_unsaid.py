@@ -1,5 +1,6 @@
 """Notes on what a URDF does not say, and on limits in it that are not read."""
 
+import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -10,6 +11,9 @@ from selfmotion.model.robot.urdf_elements import SINGLE_COORDINATE
 
 # Largest number of links or joints that a note names.
 _LISTED = 5
+# Limits of an angle above the first are no arm's [rad]; up to the second they may be degrees.
+_TURNS = 20.0
+_CIRCLE = 720.0
 # Attributes of a soft limit, and of the limit that it is within; the sign of what is narrower.
 _SOFT = (("soft_lower_limit", "lower", 1.0), ("soft_upper_limit", "upper", -1.0))
 # Parameters of an interface of ros2_control, and the attributes of a limit that they are within.
@@ -28,6 +32,24 @@ def axes_unsaid(root: ElementTree.Element) -> list[str]:
         if joint.get("type") in SINGLE_COORDINATE and joint.find("axis") is None
     ]
     return [f"{_listed(bare)}: no <axis>, which is x then"] if bare else []
+
+
+def angles_in_degrees(root: ElementTree.Element) -> list[str]:
+    """Return a note of joints that would make turn after turn: their limits may be in degrees."""
+    found = []
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") != "revolute":
+            continue
+        bounds = [abs(number_in(limit.get(key, "")) or 0.0) for key in ("lower", "upper")]
+        if _TURNS < max(bounds) <= _CIRCLE:
+            found.append(joint.get("name", ""))
+    if not found:
+        return []
+    return [
+        f"{_listed(found)}: <limit> of more than {_TURNS:g} rad, {_TURNS / (2.0 * math.pi):.2g} "
+        f"turns; in degrees? URDF has radians"
+    ]
 
 
 def limits_passed_over(root: ElementTree.Element) -> list[str]:

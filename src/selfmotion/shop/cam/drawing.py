@@ -106,7 +106,8 @@ def read_drawing(
             f"drawn in: unit = 'mm', expected one of {', '.join(LENGTH_UNITS)}"
         )
     try:
-        drawn = list(_drawn(file, drawing))
+        flat = list[str]()
+        drawn = list(_drawn(file, drawing, flat))
     except FileFormatError:
         raise
     except spoilt as error:
@@ -131,16 +132,18 @@ def read_drawing(
     layers_off = ", ".join(f"'{name}'" for name in hidden)
     notes = (
         "the tool's z axis points down, against that of the drawing",
+        *([f"{flat[0]} has scale 0 along z, which is taken for 1"] if flat else []),
         *([f"passed over: {kinds}"] if beside else []),
         *([f"passed over: layers that are off or frozen: {layers_off}"] if hidden else []),
     )
     return {name: replace(rows, notes=notes) for name, rows in found.items()}
 
 
-def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]]:
+def _drawn(file: FilePath, drawing: Any, flat: list[str]) -> Iterator[tuple[str | None, str, Any]]:
     """Yield what is drawn in model space: its layer, None if that is hidden, its place, and it.
 
     Blocks are what they are made of, where they are put; of that what is on layer 0 is on theirs.
+    Places of blocks of scale 0 along z are added to `flat`.
     """
     from ezdxf.lldxf.const import DXFError
 
@@ -161,6 +164,7 @@ def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]
         if entity.dxf.zscale == 0.0:
             # Programs for flat drawings write it.
             entity.dxf.zscale = 1.0
+            flat.append(place)
         try:
             inner = [
                 (

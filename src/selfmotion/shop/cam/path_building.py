@@ -21,7 +21,7 @@ from selfmotion.model.path import (
     section_at_rest,
 )
 from selfmotion.shop.cam.cuts import RAPID
-from selfmotion.shop.cam.path_rows import DRAWING, PoseRows, some_rows
+from selfmotion.shop.cam.path_rows import CLDATA, DRAWING, PROGRAMS, PoseRows, some_rows
 from selfmotion.shop.cam.tangents import AXES, sections_along, turning
 
 # Largest coordinate in metres [m]; one beyond can only be meant in millimetres.
@@ -525,8 +525,10 @@ def _units(file: FilePath, rows: PoseRows) -> str:
     """Return the remedy, in words, where lengths are in another unit than they are taken for."""
     if file.suffix.lower() == DRAWING:
         return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
-    if rows.straight:
+    if file.suffix.lower() in (*PROGRAMS, *CLDATA):
         return "mend the file's units (G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+    if rows.straight:
+        return "write its places in the unit of its form, or as a table with x_mm,y_mm,z_mm"
     return "name the columns x_mm,y_mm,z_mm if they are millimetres"
 
 

@@ -36,7 +36,7 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
         with file.open("rb") as stream:
             head = stream.read(_HEAD)
             first = next((line for line in lines_of(text_of(file, head)) if line.strip()), "")
-            titles = [title.strip().lower() for title in first.split(",")]
+            titles = _cells(first.lower())
             read = _reader_of(first, titles)
             content = b"" if read is None else head + stream.read(_BYTES)
         if read is None or len(content) > _BYTES:
@@ -45,6 +45,11 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
     except (OSError, FileFormatError):
         return None
     return {"": read(file, text, titles)}
+
+
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line of a table, which semicolons or commas are between."""
+    return [cell.strip() for cell in line.split(";" if ";" in line else ",")]
 
 
 def _reader_of(
@@ -116,7 +121,7 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     rows, places, feeds = list[list[float]](), list[str](), list[float]()
     lines, middles = list[int](), list[int]()
     for number, line in enumerate(lines_of(text), 1):
-        cells = [cell.strip() for cell in line.split(",")]
+        cells = _cells(line)
         if not line.strip() or [cell.lower() for cell in cells] == list(titles):
             continue
         if len(cells) != len(titles):
@@ -207,9 +212,9 @@ def _straight(
 # igus (Commonplace Robotics): X, Y, Z [mm] and A, B, C, of which only places are read.
 
 _IGUS = re.compile(
-    r"X\s*[-+.\dE]+\s*;\s*Y\s*[-+.\dE]+\s*;\s*Z\s*[-+.\dE]+\s*(?:;.*)?", re.IGNORECASE
+    r"X\s*[-+.,\dE]+\s*;\s*Y\s*[-+.,\dE]+\s*;\s*Z\s*[-+.,\dE]+\s*(?:;.*)?", re.IGNORECASE
 )
-_WORD = re.compile(r"\s*([XYZ])\s*([-+.\dE]{1,40})\s*", re.IGNORECASE)
+_WORD = re.compile(r"\s*([XYZ])\s*([-+.,\dE]{1,40})\s*", re.IGNORECASE)
 
 
 def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
@@ -223,7 +228,8 @@ def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
                 f"B …; C … as igus' programs write them"
             )
         words = filter(None, map(_WORD.fullmatch, line.split(";")))
-        said = {found[1].upper(): found[2] for found in words}
+        # Some computers write decimal commas.
+        said = {found[1].upper(): found[2].replace(",", ".") for found in words}
         rows.append([_number(file, number, said.get(key, "")) for key in "XYZ"])
         places.append(f"line {number}")
     note = (
@@ -245,6 +251,7 @@ _ARRAY = re.compile(r"array\(\s*\[([^\]]*)\]\s*\)")
 def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
     reader = csv.DictReader(io.StringIO(text))
     try:
+        reader.fieldnames = [name.strip().lower() for name in reader.fieldnames or ()]
         listed = [(reader.line_num, found) for found in reader]
     except csv.Error as error:
         raise FileFormatError(f"{file}: line {reader.line_num}: is no table: {error}") from error
@@ -276,6 +283,10 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
 # compas: frames by a point, an x axis and a y axis; print points of compas_slicer around them.
 
 _FRAME = ("point", "xaxis", "yaxis")
+# Names of a list of frames.
+_LISTS = ("frames", "data")
+# Keys of a list of frames that move nothing.
+_NAMES = ("dtype", "guid", "name")
 _SQUARE = 1e-3
 
 
@@ -287,15 +298,23 @@ def compas_poses(file: FilePath, document: Any) -> Mapping[str, PoseRows] | None
     FileFormatError
         A frame is not one; it is named.
     """
-    if isinstance(document, list) and document and all(map(_is_frame, document)):
-        frames = [_inner(item) for item in document]
-        places = [f"[{k}]" for k in range(len(frames))]
+    table = document if isinstance(document, Mapping) else {"": document}
+    key = next((name for name in ("", *_LISTS) if _are_frames(table.get(name))), None)
+    if key is not None:
+        frames = [_inner(item) for item in table[key]]
+        places = [f"{key}[{k}]" for k in range(len(frames))]
         positions, turns = _frames(file, places, frames)
         note = "compas: points in metres, as compas_fab has them"
+        others = [f"'{name}'" for name in table if name not in (key, *_NAMES)]
+        note += f"; passed over: {', '.join(others)}" if others else ""
         return {"": _straight(places, positions, "rotation", turns, None, note)}
     if isinstance(document, Mapping) and document and all(map(_is_layer, document.values())):
         return _print_points(file, document)
     return None
+
+
+def _are_frames(listed: Any) -> bool:
+    return isinstance(listed, list) and bool(listed) and all(map(_is_frame, listed))
 
 
 def _inner(item: Any) -> Any:
