@@ -6,6 +6,8 @@ from selfmotion.model.collision.bodies import (
     place_of as place_of,
 )
 from selfmotion.model.collision.by_design import (
+    ALWAYS as ALWAYS,
+    PERHAPS as PERHAPS,
     overlap_warning as overlap_warning,
     overlapping_by_design as overlapping_by_design,
 )

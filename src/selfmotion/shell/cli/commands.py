@@ -25,7 +25,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
-from selfmotion.shell.documents import example_texts, json_schema
+from selfmotion.shell.documents import MAYBE, example_texts, json_schema
 from selfmotion.shop import controllers
 
 
@@ -122,6 +122,8 @@ def init(
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
+    if MAYBE in text:
+        outputs.tell([f"links that overlap often are left out in {file}: {MAYBE}"])
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from selfmotion.shell.documents.example import (
+    MAYBE as MAYBE,
     example_text as example_text,
     example_texts as example_texts,
 )

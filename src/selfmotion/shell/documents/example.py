@@ -1,5 +1,6 @@
 """The problem files that ``selfmotion init`` writes."""
 
+import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,7 +10,12 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.model.collision import disabled_links, overlapping_by_design
+from selfmotion.model.collision import (
+    ALWAYS,
+    PERHAPS,
+    disabled_links,
+    overlapping_by_design,
+)
 from selfmotion.model.path import Circle, Line, Path
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task
@@ -313,7 +319,11 @@ def example_texts(
     task = Task.POINTING if positioner else _task_of(arm)
     where = _SEAMS if job else (_ON_PLATE if positioner else _PATH)
     whole = _HEAD + (_CELL if positioner else _ROBOT) + where + _REST + ("" if job else _OF_ONE)
-    apart = _clearance(arm, target, loaded, srdf, disabled, positioner) if clearance else _NONE
+    kept = [_NONE]
+    if clearance:
+        # Last, what may be made so as well, for the user to judge.
+        shares = (ALWAYS,) if named else (ALWAYS, PERHAPS)
+        kept = [_clearance(arm, target, loaded, srdf, disabled, positioner, x) for x in shares]
     given = _said_of_robot(robot, target, loaded, positioner) | {
         "tool": arm.tool,
         "curves": _CURVES if PositionDependentVelocityLimits().applies(arm) else "",
@@ -322,7 +332,6 @@ def example_texts(
         "command": "job" if job else "plan",
         "task": task.value,
         "away": _AWAY * arm.reach,
-        "clearance": apart,
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))
@@ -331,7 +340,7 @@ def example_texts(
             f"{arm.name}: no configuration was found from which tool '{arm.tool}' follows a circle "
             f"of {_RADII[-1]} mm; take another link as --tool"
         )
-    for radius, q in starts:
+    for apart, (radius, q) in itertools.product(dict.fromkeys(kept), starts):
         usual = '"free"' if positioner else '"dexterous"'
         begin = usual if q is None else str(np.round(q, 4).tolist())
         also = "or numbers per joint, " if q is None else 'or "dexterous", '
@@ -339,9 +348,12 @@ def example_texts(
         at = arm.dexterous_configuration(_task_of(arm)) if q is None else np.round(q, 4)
         one, two = _places(arm, at, positioner)
         given |= {"one": one, "two": two, "begin": begin, "start": "" if job else start}
+        given["clearance"] = apart
         yield whole.format(**given, radius=radius)
 
 
+# What a file says of links that it leaves out and that only the user knows of.
+MAYBE = "are made so, or may be: see that they are"
 _NONE = "clearance = false      # leaves self-collision out"
 
 
@@ -352,11 +364,17 @@ def _clearance(
     srdf: str | FilePath | None,
     disabled: Sequence[Sequence[str]],
     in_cell: bool,
+    share: float,
 ) -> str:
-    """Return the lines of a file that say which links are kept apart."""
+    """Return the lines of a file that say which links are kept apart.
+
+    But for those that overlap in at least a `share` of all configurations.
+    """
     asked = [(one, other) for one, other in disabled]
     known = () if srdf is None else disabled_links(srdf, loaded["arguments"], loaded["packages"])
-    pairs = dict.fromkeys(asked, "as asked") | overlapping_by_design(arm, (*asked, *known))
+    pairs = dict.fromkeys(asked, "as asked") | overlapping_by_design(
+        arm, (*asked, *known), share=share
+    )
     if not pairs and srdf is None:
         return "# clearance = false    # leaves self-collision out"
     said = ["distance = 0"]
@@ -371,7 +389,8 @@ def _clearance(
         )
         said.append(f"disabled = [{listed}]")
         lines = [f"# {first} - {second}: {why}" for (first, second), why in pairs.items()]
-        lines.insert(0, "# Left out, as these links are made so:")
+        made_so = "are made so" if share == ALWAYS else MAYBE
+        lines.insert(0, f"# Left out, as these links {made_so}:")
     return "\n".join([*lines, f"clearance = {{ {', '.join(said)} }}    # false: none"])
 
 
