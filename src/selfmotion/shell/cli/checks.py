@@ -87,9 +87,9 @@ class Read(NamedTuple):
         if program is None:
             return ()
         return (
-            *([program.begins_elsewhere] if program.begins_elsewhere else []),
-            *controllers.misswitched(program, None),
-            *controllers.unlike(program, robot, constraints),
+            *([program.start_fault] if program.start_fault else []),
+            *controllers.switching_faults(program, None),
+            *controllers.differing_facts(program, robot, constraints),
         )
 
 
@@ -140,13 +140,13 @@ def with_failures(certificate: sm.Certificate, texts: Sequence[str]) -> sm.Certi
 
 def left_to_controller(program: controllers.ControllerProgram | None) -> dict[str, str]:
     """Return what a verdict on a program leaves to the controller, for JSON; of others nothing."""
-    return {} if program is None else {"not_judged": controllers.of_the_controller(program)}
+    return {} if program is None else {"not_judged": controllers.controller_note(program)}
 
 
 def tell_of_controller(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
     if program is not None and program.within is not None:
-        terminal.print(controllers.of_the_controller(program), markup=False, soft_wrap=True)
+        terminal.print(controllers.controller_note(program), markup=False, soft_wrap=True)
 
 
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
@@ -235,7 +235,7 @@ def of_problem(
     def certify(motion: sm.Trajectory) -> sm.Certificate:
         return problem.certify(motion, allowed, ending, besides, progress)
 
-    lines = replace(problem, constraints=controllers.what_lines_keep(problem.constraints))
+    lines = replace(problem, constraints=controllers.constraints_of_lines(problem.constraints))
 
     def certify_lines(motion: sm.Trajectory) -> sm.Certificate:
         return lines.certify(motion, allowed, ending, besides, progress)

@@ -266,19 +266,19 @@ def _finish(
     sampled: bool,
 ) -> NoReturn:
     """Print what was written, and end."""
-    miss = None
+    deviation = None
     if sampled and isinstance(made, sm.Plan):
-        miss = controllers.linear_miss(made, rate)
+        deviation = controllers.linear_deviation(made, rate)
     if as_json:
         data: dict[str, Any] = {"verified": sound, "written": verdicts}
-        print_json(data if miss is None else data | {"linear_miss": miss._asdict()})
+        print_json(data if deviation is None else data | {"linear_miss": deviation._asdict()})
         raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
     for name, verdict in verdicts.items():
         terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
         outputs.tell_large(Path(name), terminal, given_rate=rate is not None)
-    if miss is not None:
+    if deviation is not None:
         terminal.print(
-            reread.told_straight(miss),
+            reread.told_straight(deviation),
             markup=False,
             soft_wrap=True,
         )

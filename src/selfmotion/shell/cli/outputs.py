@@ -169,7 +169,7 @@ def _tell_written(
     if sampled and not quiet:
         rate = coarsest if messages == sampled else None
         told = [reread.told_coarsest(coarsest)] if coarsest is not None else []
-        told.append(reread.told_straight(controllers.linear_miss(result, rate)))
+        told.append(reread.told_straight(controllers.linear_deviation(result, rate)))
         for text in told:
             console.print(text, markup=False, soft_wrap=True)
     return sound

@@ -99,17 +99,19 @@ def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tupl
 def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
     read = controllers.read_program(target, made.robot)
-    count, stated, found = controllers.program_miss(made, target, read)
+    count, stated, found = controllers.program_deviation(made, target, read)
     told, kept = [], verified(made) and controllers.keeps_stated(found, stated)
-    for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
+    for deviation, said, where in zip(
+        found, stated, ("off the plan", "in free moves"), strict=True
+    ):
         # The file states nine digits.
-        kept &= all(one <= other + 1e-9 for one, other in zip(miss, said, strict=True))
-        if miss.position > 0.0:
+        kept &= all(one <= other + 1e-9 for one, other in zip(deviation, said, strict=True))
+        if deviation.position > 0.0:
             told.append(
-                f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
+                f"{1e3 * deviation.position:.3g} mm and {deviation.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = controllers.misswitched(read, made)
+    switched = controllers.switching_faults(read, made)
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
     remark, at_feeds = read.remark, read.within is not None
@@ -135,13 +137,13 @@ def _told(found: sm.Certificate | sm.Parts, whole: bool) -> str:
     return f"read back: {found.verdict if whole else found.summary}"
 
 
-def told_straight(miss: controllers.LinearMiss) -> str:
+def told_straight(deviation: controllers.LinearDeviation) -> str:
     """Return what straight lines between samples cost, in words."""
-    rate = "no --rate keeps" if miss.rate is None else f"--rate {miss.rate:.0f} keeps"
+    rate = "no --rate keeps" if deviation.rate is None else f"--rate {deviation.rate:.0f} keeps"
     return (
-        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
-        f"{miss.rotation:.2g} rad of the motion; {rate} the plan's tolerance so (controllers of "
-        f"ROS 2 join by cubics or quintics, which are nearer)"
+        f"joined by straight lines, the samples stay within {deviation.position:.2g} m and "
+        f"{deviation.rotation:.2g} rad of the motion; {rate} the plan's tolerance so (controllers "
+        f"of ROS 2 join by cubics or quintics, which are nearer)"
     )
 
 

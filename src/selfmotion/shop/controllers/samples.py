@@ -85,7 +85,7 @@ class MotionSamples:
         return MotionSamples(names, joints, self.t, *orders)
 
 
-class LinearMiss(NamedTuple):
+class LinearDeviation(NamedTuple):
     """How far a controller that joins samples by straight lines leaves a plan's motion.
 
     Attributes
@@ -103,7 +103,7 @@ class LinearMiss(NamedTuple):
     rate: float | None
 
 
-def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
+def linear_deviation(plan: Plan, rate: float | None = None) -> LinearDeviation:
     """Return the error of linear interpolation between the samples of a file; see `write_motion`.
 
     Raises
@@ -111,17 +111,17 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     ProblemError
         The rate is not positive, or gives no two samples.
     """
-    misses, _ = _misses(plan, rate)
-    position, rotation = misses.max(axis=0).tolist()
-    return LinearMiss(position, rotation, _rate_that_keeps(plan))
+    deviations, _ = _deviations(plan, rate)
+    position, rotation = deviations.max(axis=0).tolist()
+    return LinearDeviation(position, rotation, _rate_that_keeps(plan))
 
 
-def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
+def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
     """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
     intervals = np.diff(samples.t)
-    misses = np.zeros((len(intervals), 2))
+    deviations = np.zeros((len(intervals), 2))
     for share in _BETWEEN:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * intervals, motion.t[-1])
         straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
@@ -131,8 +131,8 @@ def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
             # |R - R'| is 2√2 sin(angle / 2).
             half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
-            misses = np.maximum(misses, np.stack([far, angle], axis=1))
-    return misses, intervals
+            deviations = np.maximum(deviations, np.stack([far, angle], axis=1))
+    return deviations, intervals
 
 
 def _rate_that_keeps(plan: Plan) -> float | None:
@@ -145,8 +145,8 @@ def _rate_that_keeps(plan: Plan) -> float | None:
     lowest = float(np.ceil(1.0 / duration))
 
     def needed(rate: float | None) -> tuple[float, bool]:
-        misses, intervals = _misses(plan, rate)
-        share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
+        deviations, intervals = _deviations(plan, rate)
+        share = (deviations / [tolerance.position, tolerance.rotation]).max(axis=1)
         # The miss of a line over a span h is that of a parabola: it grows with h².
         found = float(np.ceil((np.sqrt(share) / intervals).max()))
         return max(found, lowest), bool(share.max() <= 1.0)
