@@ -1,4 +1,4 @@
-"""What `selfmotion check` judges: plans, motions of files, programs of controllers."""
+"""Verification by `selfmotion check`: plans, motions of files, programs of controllers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -143,7 +143,7 @@ def left_to_controller(program: controllers.ControllerProgram | None) -> dict[st
     return {} if program is None else {"not_judged": controllers.controller_note(program)}
 
 
-def tell_of_controller(program: controllers.ControllerProgram | None) -> None:
+def print_controller_note(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
     if program is not None and program.within is not None:
         terminal.print(controllers.controller_note(program), markup=False, soft_wrap=True)
@@ -157,7 +157,7 @@ def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
     return sm.calibrated(replace(problem, start="free"), calibration)
 
 
-def tell_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
+def print_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
     """Print how far the tool of a calibrated arm is from where the arm as drawn has it."""
     position, rotation = sm.off_nominal(robot, motion)
     text = (
@@ -183,7 +183,7 @@ def of_plan(
         found = problem.certify(
             plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
         )
-        tell_difference(problem.robot, plan.trajectory)
+        print_difference(problem.robot, plan.trajectory)
         asked = (*problem.requirements, *besides)
         return found, near(problem.robot, plan.trajectory, asked), problem.robot
     besides = requirements(plan.robot, *judged)
@@ -228,7 +228,7 @@ def of_problem(
             stages.print(f"note: {controllers.shift_note(program)}", markup=False, soft_wrap=True)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
-        tell_difference(problem.robot, motions[0])
+        print_difference(problem.robot, motions[0])
     besides = requirements(problem.robot, *judged)
     allowed, robot = given.within or tolerance, problem.robot
 

@@ -63,7 +63,7 @@ def plan(
     }
     given = {key: value for key, value in asked.items() if value is not None}
     remarks = job.remarks
-    outputs.tell(remarks)
+    outputs.print_notes(remarks)
     job.check_used(job.goal)
     if job.goal == "parts":
         options.refuse({"from": warm, **given}, "a motion in parts", "its own")
@@ -123,7 +123,7 @@ def init(
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
     if MAYBE in text:
-        outputs.tell([f"links that overlap often are left out in {file}: {MAYBE}"])
+        outputs.print_notes([f"links that overlap often are left out in {file}: {MAYBE}"])
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
@@ -244,14 +244,14 @@ def check(
             near = checks.near(arm, motion, asked)
             notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
             notes += [*arm.urdf.notes, *followed.notes]
-    outputs.tell(notes)
+    outputs.print_notes(notes)
     if as_json:
         data = summaries.certificate_json(certificate, near)
         data["remarks"] = [*notes, *data["remarks"]]
         print_json(data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
-        checks.tell_of_controller(program)
+        checks.print_controller_note(program)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
@@ -411,7 +411,7 @@ def fastest(
         options.refuse_twice("--keep", [kind for kind, _ in pairs])
         given["keep"] = {**(job.keep or {}), **dict(pairs)}
     remarks = job.remarks
-    outputs.tell(remarks)
+    outputs.print_notes(remarks)
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(

@@ -129,7 +129,7 @@ def calibrate(
     outputs.check_suffixes(out or [])
     planned = sm.load_plan(file)
     problem = sm.calibrated(planned.problem, calibration)
-    checks.tell_difference(problem.robot, planned.trajectory)
+    checks.print_difference(problem.robot, planned.trajectory)
     judged = checks.on_calibrated(planned.problem, calibration)
     verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
     stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
@@ -231,7 +231,10 @@ def _plain(value: Any) -> Any:
 
 _Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
 _Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
-_PROBLEMS, _PAGES = (".toml", ".json"), (".html", ".png")
+# Suffixes of problem files.
+_PROBLEM_SUFFIXES = (".toml", ".json")
+# Suffixes of pages and pictures.
+_PAGE_SUFFIXES = (".html", ".png")
 
 
 @app.command(
@@ -285,7 +288,7 @@ def place(
             "--part and --path-alone say different things; give one of them"
         )
     for file in [*(out or []), *(drawn or [])]:
-        known = (*_PROBLEMS, ".npz") if file in (out or []) else _PAGES
+        known = (*_PROBLEM_SUFFIXES, ".npz") if file in (out or []) else _PAGE_SUFFIXES
         if file.suffix not in known:
             raise sm.errors.FileFormatError(
                 f"{file}: expected a name that ends in {', '.join(known)}"

@@ -21,12 +21,18 @@ from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task
 from selfmotion.problem.constraints import PositionDependentVelocityLimits
 
-# Where the arm of an example begins: where it has room for the example's paths.
+# Initial configurations of examples: those with room for the example's paths.
 
-# Configurations that are drawn; so many of them, least singular first, are moved along the paths.
-_DRAWN, _MOVED = 1000, 60
-# Poses of each path, Newton steps to each, and what may be left of it [m, rad].
-_POSES, _STEPS, _LEFT = 41, 4, 1e-6
+# Number of random configurations.
+_RANDOM_CONFIGURATIONS = 1000
+# Number of those, least singular first, that are moved along the paths.
+_MOVED_CONFIGURATIONS = 60
+# Number of poses of each path.
+_POSES = 41
+# Number of Newton steps to each pose.
+_NEWTON_STEPS = 4
+# Largest residual of a pose [m, rad].
+_RESIDUAL = 1e-6
 
 
 def roomy_starts(arm: RobotModel, task: Task, paths: Sequence[Path], count: int) -> list[Array]:
@@ -45,12 +51,12 @@ def roomy_starts(arm: RobotModel, task: Task, paths: Sequence[Path], count: int)
         So many at most.
     """
     lower, upper = arm.finite_limits()
-    share = np.random.default_rng(0).uniform(0.25, 0.75, (_DRAWN, arm.dof))
+    share = np.random.default_rng(0).uniform(0.25, 0.75, (_RANDOM_CONFIGURATIONS, arm.dof))
     drawn = lower + (upper - lower) * share
     least = np.array([_smallest(arm, task, q) for q in drawn])
     ways = [_positions(path) for path in paths]
     found = []
-    for k in np.argsort(-least)[:_MOVED]:
+    for k in np.argsort(-least)[:_MOVED_CONFIGURATIONS]:
         room = min(_room(arm, task, drawn[k], way) for way in ways)
         if room > 0.0:
             found.append((room, int(k)))
@@ -71,13 +77,13 @@ def _room(arm: RobotModel, task: Task, q: Array, way: Array) -> float:
     begin, least = arm.pose(q), np.inf
     for offset in way:
         goal = SE3(begin.rotation, begin.translation + offset)
-        for step in range(_STEPS + 1):
+        for step in range(_NEWTON_STEPS + 1):
             jacobian, rotation, position = arm.chain.at(q)
             error = task.twist_error(goal, SE3(rotation, position))
             rows = task.select(jacobian, rotation)
             left = task.select(error[:, None], rotation)[:, 0]
-            if step == _STEPS:
-                if np.abs(left).max() > _LEFT:
+            if step == _NEWTON_STEPS:
+                if np.abs(left).max() > _RESIDUAL:
                     return 0.0
                 break
             q = q + np.linalg.pinv(rows) @ left
@@ -249,10 +255,14 @@ _OF_ONE = """\
 # [grid]               # selfmotion batch {file}: all combinations
 # "path.duration" = [3, 4, 5]
 """
-# Radii of the circle [mm], and how many starts are tried with each.
-_RADII, _TRIES = (50, 20, 5), 3
-# How far from the arm the table stands, as a share of its reach, and seams from each other [m].
-_AWAY, _APART = 0.45, 0.05
+# Radii of the circle, tried in turn [mm].
+_RADII = (50, 20, 5)
+# Number of initial configurations that are tried with each radius.
+_STARTS = 3
+# Distance of the table from the arm, as a share of the arm's reach.
+_TABLE_DISTANCE = 0.45
+# Distance of the two seams of an example [m].
+_SEAM_DISTANCE = 0.05
 
 
 def example_text(robot: str | FilePath, file: str | FilePath, **options: Any) -> str:
@@ -331,7 +341,7 @@ def example_texts(
         "file": target.name,
         "command": "job" if job else "plan",
         "task": task.value,
-        "away": _AWAY * arm.reach,
+        "away": _TABLE_DISTANCE * arm.reach,
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))
@@ -435,10 +445,10 @@ def _starts(arm: RobotModel, task: Task, job: bool) -> Iterator[tuple[int, Array
     """Yield radii [mm] and configurations to begin in, the largest circles first."""
     begin = SE3.Identity()
     second = SE3(begin)
-    second.translation = np.array([0.0, _APART, 0.0])
+    second.translation = np.array([0.0, _SEAM_DISTANCE, 0.0])
     for radius in _RADII[:1] if job else _RADII:
         if job:
-            along = np.array([_APART, 0.0, 0.0])
+            along = np.array([_SEAM_DISTANCE, 0.0, 0.0])
             paths: list[Path] = []
             for first in (begin, second):
                 last = SE3(first)
@@ -447,7 +457,7 @@ def _starts(arm: RobotModel, task: Task, job: bool) -> Iterator[tuple[int, Array
             paths.append(Line(begin, second, 1.0))
         else:
             paths = [Circle.around(begin, 1e-3 * radius, 1.0)]
-        for q in roomy_starts(arm, task, paths, _TRIES):
+        for q in roomy_starts(arm, task, paths, _STARTS):
             yield radius, q
 
 
@@ -471,7 +481,7 @@ def _places(arm: RobotModel, q: Array, on_plate: bool) -> tuple[str, str]:
         return one, two
     first = arm.pose(q)
     second = SE3(first)
-    second.translation = first.translation + np.array([0.0, _APART, 0.0])
+    second.translation = first.translation + np.array([0.0, _SEAM_DISTANCE, 0.0])
     return _pose(first), _pose(second)
 
 

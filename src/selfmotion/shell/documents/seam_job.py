@@ -28,13 +28,13 @@ from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
     in_reference,
-    led,
     obstacle,
-    own_rapids,
     placed_body,
+    rapid_ends,
     standing,
     start_of,
-    woven,
+    with_lead_table,
+    with_weave_table,
 )
 from selfmotion.shop.cam import (
     READING,
@@ -57,14 +57,16 @@ _PACED = (
     *("feed", "duration", "jump", "corners", "tolerance", "corner_angle", "ramp"),
     *("flip_normals", "standoff", "along", "lead", "tilt", "lift", *READING, *FEED_BOUNDS),
 )
-# What a feed is called that is looked for, how fast it is at most, and where it counts.
-HIGHEST, _OF_FEED = "highest", ("most_feed", "run_up")
+# Value of `feed` that asks for the highest feed.
+HIGHEST = "highest"
+# Keys of a table of seams that are about its feed.
+_OF_FEED = ("most_feed", "run_up")
 OF_TABLE = (*_PLACED, *_PACED, *_OF_FEED)
 
 
 @dataclass(frozen=True, eq=False)
 class SeamJob:
-    """What a job file says: an arm, seams, and how to plan them.
+    """A job as its file states it: an arm, seams, and settings of the planner.
 
     Attributes
     ----------
@@ -92,7 +94,7 @@ class SeamJob:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: see `Problem.remarks`; of several seams the first's."""
+        """Notes before planning, see `Problem.remarks`; of alike ones that of the first seam."""
         clearance, kept = self.settings.get("clearance"), self.settings["constraints"]
         found: dict[str, str] = {}
         for seam in self.seams:
@@ -309,12 +311,12 @@ class _Reader:
             own = {**rest, "name": name}
             events = times_of_events(path, rows)
             if "weave" in values:
-                path = woven(path, values["weave"])
+                path = with_weave_table(path, values["weave"])
             if values.get("run_up"):
                 path, events = _run_up(path, events, f"seams, '{name}'", self._file)
             if "leads" in values:
                 events = _after_lead(events, values["leads"], path)
-                path = led(path, values["leads"])
+                path = with_lead_table(path, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
             if events or rows.one_way:
@@ -421,7 +423,7 @@ def _after_lead(
     events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None, path: Path | None
 ) -> list[tuple[str, float]]:
     """Return events of a path [s] after its lead-in, whose faults are told where it is made."""
-    has_own = path is not None and own_rapids(path)[0]
+    has_own = path is not None and rapid_ends(path)[0]
     first = 0.0 if has_own else (leads or {}).get("duration", 0.0)
     later = first if isinstance(first, int | float) else 0.0
     return [(event, later + at) for event, at in events]

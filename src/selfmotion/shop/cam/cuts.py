@@ -146,7 +146,7 @@ def _transported(axes: Array) -> Array:
 
 
 class Machine:
-    """Where the tool is, and the cuts so far.
+    """State of a machine tool while its program is read, with the cuts so far.
 
     Parameters
     ----------
@@ -485,7 +485,7 @@ _PECKS = 10_000
 
 
 class Pecks(NamedTuple):
-    """How a deep hole is drilled: so far at once [m], and out in between, or only a little back."""
+    """Peck cycle of a deep hole: depth of a peck [m], and full or partial retraction between."""
 
     first: float
     others: float

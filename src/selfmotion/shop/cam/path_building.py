@@ -50,7 +50,7 @@ _BACK = 1e-3
 
 @dataclass(frozen=True)
 class Pacing:
-    """How a table is followed; see `read_path`."""
+    """Options of timing and corners of a path from a file; see `read_path`."""
 
     feed: float | None = None
     duration: float | None = None

@@ -98,7 +98,7 @@ class ControllerProgram:
 
     @property
     def targets(self) -> int:
-        """How many targets it has."""
+        """Number of targets."""
         return sum(len(segment.t) - 1 for segment in self.segments if not segment.is_rest)
 
     @property

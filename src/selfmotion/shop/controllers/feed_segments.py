@@ -83,7 +83,7 @@ class ArcLength:
 
     @property
     def whole(self) -> float:
-        """How far it goes in all [m]."""
+        """Total arc length [m]."""
         return float(self.length[-1])
 
     def at(self, times: Array) -> Array:
@@ -142,7 +142,7 @@ class Ramps(NamedTuple):
 
     @property
     def each(self) -> float:
-        """How long each of them takes [s]."""
+        """Duration of each ramp [s]."""
         return min(self.seconds - self.whole, 0.5 * self.seconds)
 
     def passed(self, times: Array) -> Array:
@@ -193,7 +193,7 @@ class FeedSegment(PoseSegment):
 
     @property
     def ramps(self) -> Ramps:
-        """How it runs up and down where times are needed."""
+        """Ramps of the segment at its planned duration."""
         return Ramps(float(self.t[-1]), self.seconds)
 
     @cached_property
@@ -220,7 +220,7 @@ class FeedSegment(PoseSegment):
 
     @cached_property
     def lengths(self) -> Array:
-        """How far the tool has gone at each target, (K + 1,) [m]."""
+        """Arc length at each target, (K + 1,) [m]."""
         return np.append(0.0, np.cumsum(step_lengths(self.positions, self.vias)))
 
     @override

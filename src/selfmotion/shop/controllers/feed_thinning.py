@@ -120,7 +120,7 @@ class FeedSection(PoseSection):
 
     @property
     def _stops(self) -> list[float]:
-        """When the tool rests, from the first to the last."""
+        """Times at which the tool rests, from first to last [s]."""
         at = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
         inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
         return [self.first, *inside.tolist(), self.last]

@@ -86,7 +86,7 @@ class MotionSamples:
 
 
 class LinearDeviation(NamedTuple):
-    """How far a controller that joins samples by straight lines leaves a plan's motion.
+    """Deviation of linear interpolation between samples from a plan's motion.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class Arc(NamedTuple):
 
     @property
     def length(self) -> float:
-        """How long it is [m]."""
+        """Arc length [m]."""
         return self.angle * float(np.linalg.norm(self.arm))
 
     @property
@@ -140,17 +140,17 @@ class Steps(NamedTuple):
 
 
 class SampledPoses(NamedTuple):
-    """A motion at places along a segment.
+    """A motion sampled along a segment.
 
     Attributes
     ----------
     travel : (N,)
-        How far the tool has gone [m].
+        Arc length of the tool [m].
     q : (N, n)
     rows : (N, 7 + m)
         Poses and external axes.
     at : callable
-        How far the tool has gone (K,) → where it is (K, 3), in the work object.
+        Arc lengths (K,) → positions (K, 3) in the work object.
     """
 
     travel: Array
