@@ -32,7 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
 from selfmotion.model.task import SE3, exp3
-from selfmotion.shop.controllers import PROGRAMS, program_miss, read_program
+from selfmotion.shop.controllers import PROGRAMS, program_deviation, read_program
 from support.industrial import industrial_arm
 from support.played_programs import Read, off, read_poses
 
@@ -187,11 +187,11 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
     targets = read.targets
     wrong += _not_shifted(case, file)
     sm.files.write_motion(case.plan, file, settings=replace(asked, targets="timed-poses"))
-    timed = program_miss(case.plan, file)[0]
+    timed = program_deviation(case.plan, file)[0]
     joints = 0
     if form in PROGRAMS:
         sm.files.write_motion(case.plan, file, settings=sm.files.ProgramSettings(WITHIN, mass=2.0))
-        joints = program_miss(case.plan, file)[0]
+        joints = program_deviation(case.plan, file)[0]
     return Row(
         *(case.kind, form, at_feed, targets, timed, joints),
         *(stated.position, found.position, "; ".join(wrong)),

@@ -74,7 +74,7 @@ def test_cuts_are_what_is_between_rapids(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         1e3 * first.positions[:4], [[0, 0, 50], [0, 0, 5], [0, 0, -2], [40, 0, -2]]
     )
-    assert first.places[:4] == ["line 5", "line 6", "line 7", "line 8"]
+    assert first.labels[:4] == ["line 5", "line 6", "line 7", "line 8"]
     assert first.feed is not None
     assert first.rapid is not None
     # From a pose on, 600 and 1200 mm/min.

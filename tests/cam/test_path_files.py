@@ -93,7 +93,7 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
     agree(path, poses, rotation=False)
     # The rest of the orientation is made up, which matters to tasks that prescribe it.
     unit, note = path.notes
-    assert unit.startswith("columns say no unit and are taken so: x,y,z for metres")
+    assert unit.startswith("columns say no unit and are taken so: t for seconds; x,y,z for metres")
     assert note.startswith("nx,ny,nz say where the tool's z axis points, not how")
     for task, told in (("pose", True), ("pointing", False), ("position", False)):
         remarks = sm.Problem(robot_named("panda"), path, task, start="free").remarks

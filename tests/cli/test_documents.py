@@ -38,7 +38,7 @@ def invoke(*arguments: str | Path) -> tuple[int, str]:
     result = CliRunner().invoke(app, ["check", *map(str, arguments)])
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
-    return result.exit_code, result.output
+    return result.exit_code, result.stdout
 
 
 @pytest.mark.parametrize("order", [1, -1])

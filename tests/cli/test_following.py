@@ -114,7 +114,7 @@ def test_states_of_a_wrong_length_are_told_with_the_right_one(
     file, port = written(tmp_path), free_port()
     controller = Controller(port, steps=20)
     told: list[str] = []
-    monkeypatch.setattr(runs, "_told_apart", told.append)
+    monkeypatch.setattr(runs, "_print_note", told.append)
     controller.start()
     code, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}")
     controller.join(10.0)
@@ -133,7 +133,7 @@ def test_a_path_that_leaves_the_reach_is_told_before_the_arm_moves(
     assert out_of_reach(sm.read_problem(file)) == ""
     file.write_text(file.read_text().replace("radius = 0.05", "radius = 0.9"))
     file.write_text("goal = 'fastest'\nmax_evaluations = 9\n" + file.read_text())
-    monkeypatch.setattr(runs, "_told_apart", told.append)
+    monkeypatch.setattr(runs, "_print_note", told.append)
     # An address that is none ends it before anything moves.
     assert "expected host:port" in complaint("follow", file, "--listen", "nowhere")
     left, note = told

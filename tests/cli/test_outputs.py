@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.shell.cli.outputs import tell_large
+from selfmotion.shell.cli.outputs import print_large
 from support.shell import complaint, invoke
 
 
@@ -69,11 +69,11 @@ def test_a_large_file_of_text_proposes_a_bag(tmp_path: Path) -> None:
     bag.write_bytes(b" " * 10_600_000)
     for file, said in ((small, False), (large, True), (bag, False)):
         told = io.StringIO()
-        tell_large(file, Console(file=told, width=400), given_rate=True)
+        print_large(file, Console(file=told, width=400), given_rate=True)
         assert (told.getvalue() != "") is said
     plain, rated = io.StringIO(), io.StringIO()
-    tell_large(large, Console(file=plain, width=400))
-    tell_large(large, Console(file=rated, width=400), given_rate=True)
+    print_large(large, Console(file=plain, width=400))
+    print_large(large, Console(file=rated, width=400), given_rate=True)
     assert plain.getvalue().endswith(f"about a third, --out {bag}\n")
     assert "has 11 MB" in plain.getvalue()
     assert ("--rate" in plain.getvalue(), "without --rate" in rated.getvalue()) == (False, True)

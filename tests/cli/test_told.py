@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.shell.cli.summaries import blocked_told
+from selfmotion.shell.cli.summaries import blocked_text
 from selfmotion.shell.documents import example_text
 from support.arms import robot_named
 from support.shell import complaint, invoke
@@ -132,7 +132,7 @@ def test_where_no_motion_was_found_past_an_obstacle_it_is_said_with_what_may_hel
     held = sm.constraints.Clearance([far], 0.005)
     problem = sm.Problem(ur5, line, "pointing", "free", constraints=[held])
     made = sm.plan(problem, search=sm.Search(starts=2, finalists=1))
-    assert not blocked_told(made)
+    assert not blocked_text(made)
     findings = [
         replace(item, satisfied=False, amount=-0.02, subject="panda_link2 - post", time=0.5)
         if item.requirement == "clearance"
@@ -142,13 +142,13 @@ def test_where_no_motion_was_found_past_an_obstacle_it_is_said_with_what_may_hel
     failed = replace(made.certificate, findings=tuple(findings), failures=("overlap",))
     looked = sm.result.Attempt("look at single poses", "nothing is in the way", None, 0.0)
     blocked = replace(made, certificate=failed, report=replace(made.report, attempts=(looked,)))
-    said = blocked_told(blocked)
+    said = blocked_text(blocked)
     assert "no continuous motion was found" in said
     assert "panda_link2 - post at t = 0.500 s" in said
     assert "what may help: a smaller clearance" in said
     # Nothing is known of single poses where these were not looked at.
     unknown = replace(blocked, report=replace(made.report, attempts=()))
-    assert "smaller clearance" not in blocked_told(unknown)
+    assert "smaller clearance" not in blocked_text(unknown)
 
 
 def test_a_clearance_that_a_pose_has_is_told_where_it_has_not_the_one_that_was_asked() -> None:

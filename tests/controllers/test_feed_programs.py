@@ -15,7 +15,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
-from selfmotion.shop.controllers import judged_program, program_miss, read_program
+from selfmotion.shop.controllers import judged_program, program_deviation, read_program
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, Ramps, times_at
 from selfmotion.shop.controllers.program_settings import axes_of
 from selfmotion.shop.controllers.steps import arc_through
@@ -101,7 +101,7 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
 ) -> None:
     file = tmp_path / name
     file.write_text(written(line, name))
-    count, stated, found = program_miss(line, file)
+    count, stated, found = program_deviation(line, file)
     assert count == 1
     (stretch,) = read_poses(file, SLIDES).stretches
     np.testing.assert_allclose(stretch.speeds, [FEED], rtol=1e-6)
@@ -114,8 +114,8 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     assert found.path.joint <= stated.path.joint
     # Times are those of who asks for them.
     file.write_text(written(line, name, targets="timed-poses"))
-    assert program_miss(line, file)[0] > 20
-    assert program_miss(line, file)[1].path.joint <= WITHIN.rotation
+    assert program_deviation(line, file)[0] > 20
+    assert program_deviation(line, file)[1].path.joint <= WITHIN.rotation
 
 
 def test_the_shell_says_what_of_a_seam_at_its_feed_it_does_not_judge(
@@ -144,7 +144,7 @@ def test_a_full_turn_is_two_circular_motions(
 ) -> None:
     file = tmp_path / name
     file.write_text(written(ring, name))
-    count, stated, found = program_miss(ring, file)
+    count, stated, found = program_deviation(ring, file)
     assert count == file.read_text().count(ROUND[name]) == 2
     far = measured(ring, file)
     assert far.position <= stated.path.position + ROUNDED
@@ -158,7 +158,7 @@ def test_a_full_turn_is_two_circular_motions(
     assert y is not None
     lines[k] = lines[k].replace(y[0], f"{y[1]}{float(y[2]) + 0.5:.4f}", 1)
     file.write_text("\n".join([*lines, ""]))
-    assert program_miss(ring, file)[2].path.position > 1e-4
+    assert program_deviation(ring, file)[2].path.position > 1e-4
 
 
 def test_a_tool_that_turns_along_goes_round_as_well(ring: sm.Plan, tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_a_tool_that_turns_along_goes_round_as_well(ring: sm.Plan, tmp_path: Pat
     for name in FILES[:2]:
         file = tmp_path / name
         sm.files.write_motion(plan, file, settings=settings(name))
-        assert program_miss(plan, file)[0] == file.read_text().count(ROUND[name]) == 1
+        assert program_deviation(plan, file)[0] == file.read_text().count(ROUND[name]) == 1
         far = measured(plan, file)
         assert far.position < 1e-6
         # Three points of four digits of a millimetre tell how far a circle of 50 mm has turned.
@@ -193,7 +193,7 @@ def test_a_seam_that_was_touched_up_is_judged(
     more = 5e-4 * (1.0 if name == "weld.script" else 1e3)
     lines[k] = lines[k].replace(x[0], f"{x[1]}{float(x[2]) + more:.9f}", 1)
     file.write_text("\n".join([*lines, ""]))
-    _, stated, found = program_miss(line, file)
+    _, stated, found = program_deviation(line, file)
     assert found.path.position == pytest.approx(5e-4, rel=0.05)
     assert found.path.position > stated.path.position
 
@@ -364,7 +364,7 @@ def test_strokes_switch_where_their_feed_begins(
     read = read_poses(file, SLIDES)
     moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
     far = off(ur10, read, program.trajectory, "base", "tool0", named(program), moves)
-    assert far.position <= program_miss(program, file)[1].path.position + ROUNDED
+    assert far.position <= program_deviation(program, file)[1].path.position + ROUNDED
     assert far.axis <= WITHIN.rotation
 
 
@@ -394,7 +394,7 @@ def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) ->
     speeds = [float(stretch.speeds[0]) for stretch in stretches]
     np.testing.assert_allclose(speeds, [0.05 / 0.75, FEED, 0.05 / 0.75], rtol=1e-4)
     far = measured(plan, file)
-    assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED
+    assert far.position <= program_deviation(plan, file)[1].path.position + ROUNDED
 
 
 def test_clearances_decide_how_far_the_arm_may_be_off(abb: sm.RobotModel, tmp_path: Path) -> None:
@@ -406,7 +406,7 @@ def test_clearances_decide_how_far_the_arm_may_be_off(abb: sm.RobotModel, tmp_pa
     plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
     file = tmp_path / "weld.mod"
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
-    free = program_miss(plan, file)[1].path.joint
+    free = program_deviation(plan, file)[1].path.joint
     # Joint 6 has as much room as its own plan takes, and no more.
     q = plan.trajectory.q
     room = 0.01 * free
@@ -527,16 +527,16 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
     sm.files.write_motion(plan, file, settings=settings(name))
     (stretch,) = read_poses(file, SLIDES).stretches
     np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
-    assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
+    assert measured(plan, file).position <= program_deviation(plan, file)[1].path.position + ROUNDED
     read_program(file, abb).motions(seam)[0]
     # Without the targets where they change all of it is as fast as at its ends.
     whole = stretch_of(file, abb)
     alone = replace(
         whole,
-        t=times_at(whole.places[[0, -1]], whole.vias[:1], whole.speeds[:1]),
+        t=times_at(whole.positions[[0, -1]], whole.vias[:1], whole.speeds[:1]),
         q=whole.q[[0, -1]],
-        places=whole.places[[0, -1]],
-        turns=whole.turns[[0, -1]],
+        positions=whole.positions[[0, -1]],
+        quaternions=whole.quaternions[[0, -1]],
         speeds=whole.speeds[:1],
         vias=whole.vias[:1],
     )
@@ -565,7 +565,7 @@ def test_lines_are_judged_as_lines(abb: sm.RobotModel, tmp_path: Path) -> None:
     (arc,) = [item for item in text.splitlines() if "MoveC" in item]
     # Through as many points of it.
     times = np.linspace(0.0, whole.t[-1], 2 * count + 1)
-    lines, place = [], arc_through(whole.places[0], whole.vias[0], whole.places[1])
+    lines, place = [], arc_through(whole.positions[0], whole.vias[0], whole.positions[1])
     assert place is not None
     turn = re.findall(r"\], (\[[^\[\]]*\]), \[0, 0", text)[-1]
     for k, (x, y, z) in enumerate(1e3 * place.at(times / whole.t[-1])[2::2], 1):
@@ -618,7 +618,7 @@ def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_
     certificate = plan.problem.certify(read_program(file, abb).motions(seam)[0], WITHIN)
     assert certificate.position_error.value < WITHIN.position
     far = measured(plan, file)
-    assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED
+    assert far.position <= program_deviation(plan, file)[1].path.position + ROUNDED
 
 
 def test_where_no_poses_keep_a_feed_is_told_with_what_helps(

@@ -345,41 +345,41 @@ def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rate", [None, 20.0, 100.0])
 def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | None) -> None:
-    from selfmotion.shop.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_deviation
 
-    miss = linear_miss(plan, rate)
+    deviation = linear_deviation(plan, rate)
     samples = MotionSamples.of(plan.trajectory, rate)
     worst = 0.0
     for t in np.linspace(0.0, plan.trajectory.duration, 1501):
         line = np.array([np.interp(t, samples.t, column) for column in samples.q.T])
         there = plan.robot.pose(plan.trajectory(t)).translation
         worst = max(worst, float(np.linalg.norm(plan.robot.pose(line).translation - there)))
-    assert 0.9 * worst <= miss.position
-    assert miss.position <= 1.1 * worst
+    assert 0.9 * worst <= deviation.position
+    assert deviation.position <= 1.1 * worst
     # At the rate that is named, lines stay within the plan's tolerance, and there the same rate is
     # named again; not at half of it, and hardly at a lower one.
-    assert miss.rate is not None
+    assert deviation.rate is not None
     limits = (plan.tolerance.position, plan.tolerance.rotation)
-    kept = linear_miss(plan, miss.rate)
+    kept = linear_deviation(plan, deviation.rate)
     assert max(np.divide(kept[:2], limits)) <= 1.0
-    assert kept.rate == miss.rate
-    assert max(np.divide(linear_miss(plan, 0.95 * miss.rate)[:2], limits)) > 1.0
-    assert max(np.divide(linear_miss(plan, 0.5 * miss.rate)[:2], limits)) > 2.0
+    assert kept.rate == deviation.rate
+    assert max(np.divide(linear_deviation(plan, 0.95 * deviation.rate)[:2], limits)) > 1.0
+    assert max(np.divide(linear_deviation(plan, 0.5 * deviation.rate)[:2], limits)) > 2.0
 
 
 def test_no_rate_is_named_where_files_have_no_so_many_samples(plan: sm.Plan) -> None:
-    from selfmotion.shop.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_deviation
 
     judged = dataclasses.replace(plan.certificate, tolerance=sm.Tolerance(1e-17, 1e-17))
     strict = dataclasses.replace(plan, certificate=judged)
-    assert linear_miss(strict, 20.0).rate is None
+    assert linear_deviation(strict, 20.0).rate is None
 
 
 def test_messages_of_ros_have_the_coarsest_rate_that_keeps_the_tolerance(
     plan: sm.Plan, tmp_path: Path
 ) -> None:
     """Where that is fewer samples than the plan's own; and lower rates do not keep it."""
-    from selfmotion.shop.controllers import coarsest_rate, linear_miss
+    from selfmotion.shop.controllers import coarsest_rate, linear_deviation
 
     assert coarsest_rate(plan) is None
     sm.files.write_motion(plan, tmp_path / "all.yaml")
@@ -389,8 +389,8 @@ def test_messages_of_ros_have_the_coarsest_rate_that_keeps_the_tolerance(
     rate = coarsest_rate(loose)
     assert rate is not None
     for asked in (rate, 0.7 * rate):
-        miss = linear_miss(loose, asked)
-        taken = max(miss.position / within.position, miss.rotation / within.rotation)
+        deviation = linear_deviation(loose, asked)
+        taken = max(deviation.position / within.position, deviation.rotation / within.rotation)
         assert (taken <= 1.0) == (asked == rate)
     sm.files.write_motion(loose, tmp_path / "few.yaml")
     few = sm.files.read_motion(tmp_path / "few.yaml")
@@ -512,7 +512,7 @@ def test_programs_have_no_parts_and_other_files_beside_them_do(
 
 def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
     """The hand that only holds on is off as well, and may be the one that is off most."""
-    from selfmotion.shop.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_deviation
 
     samples = MotionSamples.of(carried.trajectory, 10.0)
     middles = 0.5 * (samples.t[1:] + samples.t[:-1])
@@ -525,4 +525,4 @@ def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
         for chain in (item.chain for item in carried.problem.follows.items)
     ]
     rounding = 1e-12
-    assert linear_miss(carried, 10.0).position >= max(worst) - rounding
+    assert linear_deviation(carried, 10.0).position >= max(worst) - rounding

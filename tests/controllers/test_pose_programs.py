@@ -12,11 +12,16 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
-from selfmotion.shop.controllers import judged_program, program_files, program_miss, read_program
+from selfmotion.shop.controllers import (
+    judged_program,
+    program_deviation,
+    program_files,
+    read_program,
+)
 from selfmotion.shop.controllers.configurations import confdata, status_and_turn
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
 from selfmotion.shop.controllers.program_settings import axes_of
-from selfmotion.shop.controllers.segments import Miss, Misses, miss_between
+from selfmotion.shop.controllers.segments import Deviation, Deviations, deviation_between
 from selfmotion.shop.controllers.tool_frames import ToolFrames, frame_of_paths, turned_base
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams
@@ -101,7 +106,7 @@ def test_what_controllers_make_of_poses_is_as_near_as_is_stated(
     file = tmp_path / name
     within = sm.Tolerance(deviation, 10.0 * deviation)
     sm.files.write_motion(alone, file, settings=settings(name, deviation=within, work_object=WORK))
-    count, stated, found = program_miss(alone, file)
+    count, stated, found = program_deviation(alone, file)
     read = read_poses(file, SLIDES)
     flange = alone.robot.urdf.links[-2]
     measured = off(alone.robot, read, alone.trajectory, None, flange, named(alone))
@@ -115,14 +120,14 @@ def test_what_controllers_make_of_poses_is_as_near_as_is_stated(
     joints = replace(settings(name, deviation=within), targets="joints")
     if name != "weld.script":
         sm.files.write_motion(alone, file, settings=joints)
-        assert 0.5 < count / program_miss(alone, file)[0] < 2.0
+        assert 0.5 < count / program_deviation(alone, file)[0] < 2.0
 
 
 @pytest.mark.parametrize("name", FILES[:2])
 def test_external_axes_hold_the_redundancy(on_rail: sm.Plan, tmp_path: Path, name: str) -> None:
     file = tmp_path / name
     sm.files.write_motion(on_rail, file, settings=settings(name))
-    _, stated, _ = program_miss(on_rail, file)
+    _, stated, _ = program_deviation(on_rail, file)
     read = read_poses(file, SLIDES)
     measured = off(on_rail.robot, read, on_rail.trajectory, None, "flange", named(on_rail))
     assert measured.position <= stated.path.position + ROUNDED
@@ -140,7 +145,7 @@ def test_a_positioner_carries_its_work_object(
     with pytest.raises(sm.errors.ProblemError, match="say positioner = "):
         sm.files.write_motion(turned, file, settings=settings(name))
     sm.files.write_motion(turned, file, settings=settings(name, positioner=unit))
-    _, stated, _ = program_miss(turned, file)
+    _, stated, _ = program_deviation(turned, file)
     read = read_poses(file, {"E1": False, "E2": False})
     links = "table/plate", "arm/tool0"
     measured = off(turned.robot, read, turned.trajectory, *links, named(turned))
@@ -246,7 +251,7 @@ def test_a_pose_that_was_touched_up_is_judged(alone: sm.Plan, tmp_path: Path, na
     more = 5e-4 * (1.0 if name == "weld.script" else 1e3)
     lines[k] = lines[k].replace(x[0], f"{x[1]}{float(x[2]) + more:.9f}", 1)
     file.write_text("\n".join(lines) + "\n")
-    _, stated, found = program_miss(alone, file)
+    _, stated, found = program_deviation(alone, file)
     assert found.path.position > 4e-4 > 2.0 * stated.path.position
 
 
@@ -259,7 +264,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
     asked = settings(name, deviation=sm.Tolerance(1e-3, 1e-2))
     sm.files.write_motion(program, file, settings=asked)
     assert judged_program(file, program).verified, judged_program(file, program).verdict
-    _, stated, _ = program_miss(program, file)
+    _, stated, _ = program_deviation(program, file)
     moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
     read = read_poses(file, SLIDES)
     seams = off(program.robot, read, program.trajectory, "base", "tool0", named(program), moves)
@@ -484,7 +489,7 @@ def test_out_of_and_into_a_singular_home_joints_are_written(
         file = tmp_path / name
         sm.files.write_motion(move, file, settings=settings(name))
         assert not re.search(r"movel|MoveL|\bSPL\b|\bLIN\b", file.read_text())
-        _, stated, found = program_miss(move, file)
+        _, stated, found = program_deviation(move, file)
         assert np.all(np.array(found.moves) <= np.array(stated.moves) + ROUNDED)
 
 
@@ -508,15 +513,15 @@ def test_what_is_not_read_as_it_is_written_is_written_by_joints(
     alone: sm.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where poses are off when a file is read again, whatever for, no such file is left."""
-    read = program_files.program_miss
-    off = Misses(Miss(1.0, 0.0, 0.0), Miss(0.0, 0.0, 0.0))
+    read = program_files.program_deviation
+    off = Deviations(Deviation(1.0, 0.0, 0.0), Deviation(0.0, 0.0, 0.0))
     asked = settings("a.mod")
 
-    def spoilt(plan: sm.Plan, file: Path) -> tuple[int, Misses, Misses]:
+    def spoilt(plan: sm.Plan, file: Path) -> tuple[int, Deviations, Deviations]:
         count, stated, found = read(plan, file)
         return count, stated, off if "MoveL" in file.read_text() else found
 
-    monkeypatch.setattr(program_files, "program_miss", spoilt)
+    monkeypatch.setattr(program_files, "program_deviation", spoilt)
     sm.files.write_motion(alone, tmp_path / "a.mod", settings=asked)
     text = (tmp_path / "a.mod").read_text()
     assert "MoveL" not in text
@@ -527,8 +532,8 @@ def test_what_is_not_read_as_it_is_written_is_written_by_joints(
 def test_joints_that_no_pose_gives_are_infinitely_far_off(abb: sm.RobotModel) -> None:
     q = np.zeros((2, 6))
     unknown = np.array([np.zeros(6), np.full(6, np.nan)])
-    assert miss_between(unknown, q, [abb.chain]).position == np.inf
-    assert miss_between(q, q, [abb.chain]).position == 0.0
+    assert deviation_between(unknown, q, [abb.chain]).position == np.inf
+    assert deviation_between(q, q, [abb.chain]).position == 0.0
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -543,8 +548,8 @@ def test_the_frame_of_the_path_may_be_the_work_object(name: str, tmp_path: Path)
     file = tmp_path / name
     sm.files.write_motion(plan, file, settings=settings(name, work_object="path"))
     (stretch,) = read_program(file, ur5).segments
-    np.testing.assert_allclose(stretch.places[0], begin.translation, atol=2e-7)
-    np.testing.assert_allclose(stretch.places[-1], end.translation, atol=2e-7)
+    np.testing.assert_allclose(stretch.positions[0], begin.translation, atol=2e-7)
+    np.testing.assert_allclose(stretch.positions[-1], end.translation, atol=2e-7)
     # And it is where the table lies, by a chain that the program knows nothing of.
     base = ur5.chain_to("base").place(np.zeros(6))
     found = base * stretch.frames.work

@@ -13,10 +13,10 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Separation
 from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
-from selfmotion.shop.controllers import judged_program, program_miss
+from selfmotion.shop.controllers import judged_program, program_deviation
 from selfmotion.shop.controllers.program_files import read_program
 from selfmotion.shop.controllers.program_settings import axes_of, tool_from_flange
-from selfmotion.shop.controllers.segments import NO_MISS
+from selfmotion.shop.controllers.segments import NO_DEVIATION
 from selfmotion.shop.controllers.thinning import Operation, Section
 from selfmotion.work.job import Step
 from support.arms import PANDA_HOME, robot_named
@@ -124,7 +124,7 @@ def test_the_deviation_that_is_stated_holds(
     file, counts = tmp_path / name, []
     for deviation in (1e-3, 1e-4):
         sm.files.write_motion(plan, file, settings=settings(name, deviation))
-        count, stated, found = program_miss(plan, file)
+        count, stated, found = program_deviation(plan, file)
         counts.append(count)
         # KUKA's LBR and ABB's IRB 14000 count the third of seven joints apart.
         t, q = joined(file, plan.robot.joint_names, seventh=2 if plan.robot.dof == 7 else None)
@@ -165,7 +165,7 @@ def test_what_is_read_is_what_was_written(
         r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
     )
     file.write_text(text[:middle] + moved)
-    _, stated, found = program_miss(plan, file)
+    _, stated, found = program_deviation(plan, file)
     assert found.path.position > 2.0 * stated.path.position
 
 
@@ -182,7 +182,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
     np.testing.assert_allclose(q, program.trajectory(np.minimum(t, program.duration)), atol=LATE)
     motion = sm.files.read_motion(file)
     assert motion.duration == pytest.approx(program.duration, abs=1e-4)
-    count, stated, found = program_miss(program, file)
+    count, stated, found = program_deviation(program, file)
     assert found.path.position <= stated.path.position <= 2e-4
     assert count < len(program.trajectory.t)
     switched = r"\$OUT\[7\] = (TRUE|FALSE)" if name.endswith("src") else "SetDO doArc, ([01]);"
@@ -235,7 +235,7 @@ def test_where_the_arm_rests_controllers_stop(cornered: sm.Plan, tmp_path: Path,
         assert first.count("SPTP", after) <= 1
         assert after < text.rindex("PTP_SPLINE")
     for file in (abb, kuka):
-        _, stated, found = program_miss(made, file)
+        _, stated, found = program_deviation(made, file)
         assert found.path.position <= stated.path.position <= 2e-4
 
 
@@ -258,8 +258,8 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
     """However the controller joins the targets; the elbow and all else, not the tool alone."""
     file = tmp_path / name
     sm.files.write_motion(past, file, settings=settings(name, 1e-4))
-    few, stated, found = program_miss(past, file)
-    assert stated.path == NO_MISS
+    few, stated, found = program_deviation(past, file)
+    assert stated.path == NO_DEVIATION
     assert found.moves.position <= stated.moves.position
     assert stated.moves.position > 5e-4
     (apart,) = (item for item in past.requirements if isinstance(item, Separation))
@@ -270,7 +270,7 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
     # Where nothing else is said, and not for less.
     narrow = replace(settings(name, 1e-4), move_deviation=sm.Tolerance(1e-4, 1e-3))
     sm.files.write_motion(past, file, settings=narrow)
-    many, stated, found = program_miss(past, file)
+    many, stated, found = program_deviation(past, file)
     assert found.moves.position <= stated.moves.position <= 1e-4
     assert many > 1.5 * few
 
@@ -284,7 +284,7 @@ def test_targets_grow_with_the_root_of_the_error_where_a_motion_has_straight_par
         within = sm.Tolerance(deviation, 10 * deviation)
         asked = replace(settings("a.src"), move_deviation=within)
         sm.files.write_motion(past, tmp_path / "a.src", settings=asked)
-        count, stated, _ = program_miss(past, tmp_path / "a.src")
+        count, stated, _ = program_deviation(past, tmp_path / "a.src")
         assert stated.moves.position <= deviation
         counts.append(count)
     assert counts[1] < 4.0 * counts[0]
@@ -682,12 +682,12 @@ def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
     file = tmp_path / "weld.src"
     sm.files.write_motion(program, file, settings=settings("weld.src", 1e-3))
     assert reread._confirmed(program, file)[0]
-    count, stated, found = program_miss(program, file)
+    count, stated, found = program_deviation(program, file)
     for k in range(3):
         path = list(found.path)
         path[k] = stated.path[k] + 1e-8
         off = count, stated, found._replace(path=type(found.path)(*path))
-        monkeypatch.setattr(controllers, "program_miss", lambda *_, off=off: off)
+        monkeypatch.setattr(controllers, "program_deviation", lambda *_, off=off: off)
         assert not reread._confirmed(program, file)[0]
     monkeypatch.undo()
     file.write_text(file.read_text().replace("= FALSE", "= TRUE"))

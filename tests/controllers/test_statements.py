@@ -16,7 +16,7 @@ from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_writer import WrittenPose
 from selfmotion.shop.controllers.rapid import RAPID
 from selfmotion.shop.controllers.rapid_reader import RapidReader
-from selfmotion.shop.controllers.read_segments import Pose
+from selfmotion.shop.controllers.segment_building import Pose
 from selfmotion.shop.controllers.statements import Statement, Table, number, word
 from selfmotion.shop.controllers.urscript import URSCRIPT, UrscriptReader
 
@@ -79,8 +79,8 @@ def same(found: Any, given: Any) -> bool:
         return bool(np.abs(found.homogeneous - given.homogeneous).max() < DIGITS)
     if isinstance(given, WrittenPose):
         assert isinstance(found, Pose)
-        turned = min(np.abs(found.turn - s * given.turn).max() for s in (1.0, -1.0))
-        return bool(np.abs(found.place - given.place).max() < DIGITS and turned < DIGITS)
+        turned = min(np.abs(found.quaternion - s * given.quaternion).max() for s in (1.0, -1.0))
+        return bool(np.abs(found.position - given.position).max() < DIGITS and turned < DIGITS)
     if isinstance(given, str):
         return bool(found == given)
     if isinstance(given, dict):

@@ -145,7 +145,7 @@ def test_targets_that_are_left_out_are_missed(
     text = file.read_text()
     assert invoke("check", file, "--robot", kept)[0] == 0
     file.write_text(THINNED[suffix](text, 2))
-    stated = read_program(file, plan.robot).miss.path.position
+    stated = read_program(file, plan.robot).deviation.path.position
     if targets == "joints":
         assert off_by_straight_lines(plan, file) > stated + DIGITS
     code, printed = invoke("check", file, "--robot", kept)
@@ -375,12 +375,12 @@ def test_a_load_is_that_which_torques_were_verified_with(tmp_path: Path) -> None
     assert program.load is not None
     (verified,) = verified_loads(ur5, asked, program.facts.flange)
     assert program.load.is_like(verified)
-    assert not list(controllers.unlike(program, ur5, asked))
+    assert not list(controllers.differing_facts(program, ur5, asked))
     for other in (replace(same, mass=20.0), replace(same, center=(0.0, 0.0, 0.1))):
         with pytest.raises(sm.errors.ProblemError, match="torques were verified with 2 kg"):
             sm.files.write_motion(move, file, settings=other)
     changed = replace(program, load=Load(3.0, program.load.center))
-    assert any("torques" in text for text in controllers.unlike(changed, ur5, asked))
+    assert any("torques" in text for text in controllers.differing_facts(changed, ur5, asked))
 
 
 def test_the_load_has_what_the_urdf_has_beyond_the_flange() -> None:
@@ -417,7 +417,7 @@ def test_free_moves_are_those_of_the_job(job: sm.Program, tmp_path: Path) -> Non
     )
     file.write_text(text[:before] + moved + text[after:])
     found = judged_program(file, job)
-    assert program.miss.moves.joint < np.radians(2.0)
+    assert program.deviation.moves.joint < np.radians(2.0)
     assert any("free moves are up to" in text for text in found.failures)
 
 

@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.model.collision import PERHAPS, overlapping_by_design
 from selfmotion.shell.documents import example_text
 from selfmotion.shop.cam import Reading, one_seam
 from selfmotion.shop.cam.gcode import read_gcode
@@ -26,9 +27,21 @@ DIGITS, CHORD, ROUNDING = 1e-6, 1e-5, 1e-6
 
 def planned(out: Path, *arguments: str | Path) -> sm.Plan:
     """Plan in the shell, verified; return the plan."""
-    code, text = invoke("plan", *arguments, "--out", out / "x.npz")
+    return reported(out, *arguments)[0]
+
+
+def reported(out: Path, *arguments: str | Path) -> tuple[sm.Plan, str]:
+    """Plan in the shell, verified; return the plan, and the notes that the shell prints."""
+    code, text = invoke("plan", *arguments, "--json", "--out", out / "x.npz")
     assert code == 0, text
-    return sm.load_plan(out / "x.npz")
+    assert json.loads(text)["certificate"]["verified"]
+    return sm.load_plan(out / "x.npz"), "\n".join(json.loads(text)["remarks"])
+
+
+def along_it(path: sm.paths.Path, count: int = 2001) -> np.ndarray:
+    """Return where the tool is along a path, in the frame of its file: 0.45, 0, 0.3 [m]."""
+    places = path.samples(np.linspace(0.0, path.duration, count)).translation
+    return np.asarray(places) - [0.45, 0.0, 0.3]
 
 
 def tips_of(plan: sm.Plan, count: int = 401) -> tuple[np.ndarray, np.ndarray]:
@@ -40,39 +53,57 @@ def tips_of(plan: sm.Plan, count: int = 401) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     ("name", "deepest"), [("peck", -10), ("peck_5mm", -10), ("g81_shallow", -2), ("g81_deep", -10)]
 )
-def test_drilled_holes_have_the_feeds_of_their_files(name: str, deepest: float) -> None:
+def test_drilled_holes_have_the_feeds_of_their_files(
+    name: str, deepest: float, tmp_path: Path
+) -> None:
     file = CASES / "peck_drilling" / f"{name}.nc"
     path = sm.files.read_path(file)
-    assert {round(feed.asked, 6) for feed in path.feeds} == {0.006667}
-    assert all(feed.kept for feed in path.feeds)
     heights = path.samples(np.linspace(0.0, path.duration, 4001)).translation[:, 2]
     assert heights.min() == pytest.approx(1e-3 * deepest, abs=CHORD)
-    np.testing.assert_allclose(heights[0], heights[-1], atol=DIGITS)
+    if name == "peck":
+        # Three pecks of 0.6 mm are planned, not all.
+        text, deepest = file.read_text(), 1.2
+        file = tmp_path / "peck.nc"
+        file.write_text(text.replace("Z-10", "Z1.2"))
+    # What it costs is not looked at.
+    asked = (*PANDA_AT, "--max-evaluations", "1")
+    plan, notes = reported(tmp_path, "panda", "--path", file, *asked)
+    assert {round(feed.asked, 6) for feed in plan.path.feeds} == {0.006667}
+    assert all(feed.kept for feed in plan.path.feeds)
+    assert "stock and engagement are not judged" in notes
+    own = 1e3 * (tips_of(plan, 2001)[1] - [0.45, 0.0, 0.3])
+    np.testing.assert_allclose(own[:, :2], np.tile([10.0, 0.0], (len(own), 1)), atol=1e-2)
+    np.testing.assert_allclose(own[0, 2], own[-1, 2], atol=1e-2)
+    assert own[:, 2].min() == pytest.approx(deepest, abs=0.02)
 
 
-def test_a_flat_block_is_that_of_scale_one() -> None:
-    for name in ("flat", "plain"):
-        file = CASES / "flat_block" / f"{name}.dxf"
-        circle = sm.files.read_path(file, feed=0.02, seam="0 1")
-        line = sm.files.read_path(file, feed=0.02, seam="0 2")
-        ends = [line.pose(0.0).translation, line.pose(line.duration).translation]
-        np.testing.assert_allclose(ends, [[0, 0, 0], [0.06, 0, 0]], atol=DIGITS)
-        samples = circle.samples(np.linspace(0.0, circle.duration, 2001)).translation
-        away = np.linalg.norm(samples[:, :2] - [0.02, 0.01], axis=1)
-        # Corners of the chords are rounded, too.
-        np.testing.assert_allclose(away, 0.005, atol=5 * CHORD)
-        length = np.linalg.norm(np.diff(samples, axis=0), axis=1).sum()
-        assert length == pytest.approx(2 * math.pi * 5e-3, rel=3e-3)
+def test_a_flat_block_is_that_of_scale_one(tmp_path: Path) -> None:
+    file = CASES / "flat_block" / "flat.dxf"
+    line = sm.files.read_path(file, feed=0.02, seam="0 2")
+    ends = [line.pose(0.0).translation, line.pose(line.duration).translation]
+    np.testing.assert_allclose(ends, [[0, 0, 0], [0.06, 0, 0]], atol=DIGITS)
+    asked = ("--feed", "0.02", "--seam", "0 1", *PANDA_AT)
+    found = along_it(planned(tmp_path, "panda", "--path", file, *asked).path)
+    plain = sm.files.read_path(file.with_name("plain.dxf"), feed=0.02, seam="0 1")
+    moved = np.add(along_it(plain), [0.45, 0.0, 0.3])
+    np.testing.assert_allclose(found, moved, atol=DIGITS)
+    away = np.linalg.norm(found[:, :2] - [0.02, 0.01], axis=1)
+    # Corners of the chords are rounded, too.
+    np.testing.assert_allclose(away, 0.005, atol=5 * CHORD)
+    length = np.linalg.norm(np.diff(found, axis=0), axis=1).sum()
+    assert length == pytest.approx(2 * math.pi * 5e-3, rel=3e-3)
 
 
-def test_words_of_sinumerik_say_the_tools_axis() -> None:
-    (cut,) = read_gcode(CASES / "sinumerik_words" / "arm.mpf").values()
-    assert cut.feed is not None
-    assert cut.rapid is None or not cut.rapid[1:-1].any()
-    np.testing.assert_allclose(cut.feed[-2], 2.0 / 60.0)
-    np.testing.assert_allclose(1e3 * cut.positions[-3:], [[0, 0, 0], [40, 0, 0], [80, 0, 0]])
-    np.testing.assert_allclose(cut.values[0][:, 2], [0, 0, -1], atol=DIGITS)
-    np.testing.assert_allclose(cut.values[-1][:, 2], [-0.34202, 0, -0.939693], atol=DIGITS)
+def test_words_of_sinumerik_say_the_tools_axis(tmp_path: Path) -> None:
+    file = CASES / "sinumerik_words" / "arm.mpf"
+    plan, notes = reported(tmp_path, "panda", "--path", file, *PANDA_AT)
+    assert "no line says G20 or G21: lengths are taken for mm" in notes
+    assert {round(feed.asked, 6) for feed in plan.path.feeds} == {0.033333}
+    rotations, places = tips_of(plan)
+    np.testing.assert_allclose(rotations[0, :, 2], [0, 0, -1], atol=DIGITS)
+    np.testing.assert_allclose(rotations[-1, :, 2], [-0.34202, 0, -0.939693], atol=DIGITS)
+    ends = 1e3 * (places[[0, -1]] - [0.45, 0.0, 0.3])
+    np.testing.assert_allclose(ends[-1], [80, 0, 0], atol=1e-2)
 
 
 @pytest.mark.parametrize("name", ["teach.mod", "cut.src", "move.script"])
@@ -124,15 +155,29 @@ def test_a_limit_without_effort_or_speed_is_none(tmp_path: Path) -> None:
     folder = CASES / "limit_without_effort"
     known = planned(tmp_path, folder / "with_effort.urdf", "--circle", "0.03")
     for name in ("no_effort", "continuous_velocity_only"):
-        plan = planned(tmp_path, folder / f"{name}.urdf", "--circle", "0.03")
-        remarks = plan.problem.robot.urdf.notes
+        plan, notes = reported(tmp_path, folder / f"{name}.urdf", "--circle", "0.03")
         robot = sm.load_robot(folder / f"{name}.urdf")
-        assert any("<limit> without effort: taken for none" in note for note in robot.urdf.notes)
-        assert isinstance(remarks, tuple)
+        assert "<limit> without effort: taken for none, torques are not limited" in notes
         if name == "no_effort":
             np.testing.assert_allclose(plan.trajectory.q, known.trajectory.q, atol=ROUNDING)
         with pytest.raises(sm.errors.ProblemError, match=r"'j1' has a <limit> without effort"):
             sm.constraints.JointTorqueLimits().of(robot)
+
+
+@pytest.mark.parametrize(
+    ("limit", "note"),
+    [
+        ('lower="-2" upper="2" velocity="0" effort="0"', "'j1': <limit> with velocity 0: taken"),
+        ('lower="-2" upper="2" effort="9"', "'j1': <limit> without velocity: taken for none"),
+        ('lower="-115" upper="115" velocity="2" effort="9"', "'j1': <limit> of more than 20 rad"),
+    ],
+)
+def test_a_limit_of_zero_or_in_degrees_is_told(limit: str, note: str) -> None:
+    text = (CASES / "limit_without_effort" / "with_effort.urdf").read_text()
+    joint = re.compile(r'(name="j1" type=")\w+(".*?)<limit[^>]*/>', re.DOTALL)
+    given = joint.sub(rf"\1revolute\2<limit {limit}/>", text, count=1)
+    assert given != text
+    assert any(said.startswith(note) for said in sm.load_robot(given).urdf.notes)
 
 
 def test_a_planar_joint_with_limits_is_three_joints(tmp_path: Path) -> None:
@@ -152,7 +197,8 @@ def test_a_planar_joint_with_limits_is_three_joints(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             one.pose(q).homogeneous, other.pose(q).homogeneous, atol=ROUNDING
         )
-    planned(tmp_path, tmp_path / "base.urdf", *asked)
+    _, notes = reported(tmp_path, tmp_path / "base.urdf", *asked)
+    assert "base_move_x, base_move_y, base_move_yaw" in notes
 
 
 def test_a_plane_that_leans_is_left_for_no_joint_of_it() -> None:
@@ -205,6 +251,34 @@ def test_a_telescope_is_begun_with_its_overlaps_left_out(tmp_path: Path) -> None
     assert 'srdf = "own.srdf"' in text
     assert '["mast", "a1"]' not in text
     assert '["mast", "a2"]' in text
+
+
+WRIST = """<robot name="wrist"><link name="base"/>
+<link name="yaw"><collision><geometry><box size="0.2 0.1 0.1"/></geometry></collision></link>
+<link name="pitch"/><link name="roll"><collision><origin xyz="0.151 0 0"/>
+<geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<joint name="a" type="revolute"><parent link="base"/><child link="yaw"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+<joint name="b" type="prismatic"><parent link="yaw"/><child link="pitch"/><axis xyz="1 0 0"/>
+<limit lower="-0.1" upper="0.15" velocity="1" effort="1"/></joint>
+<joint name="c" type="prismatic"><parent link="pitch"/><child link="roll"/><axis xyz="0 1 0"/>
+<limit lower="0" upper="0.05" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def test_links_that_overlap_in_half_of_all_configurations_are_left_out_last() -> None:
+    """At b = 0 they are 1 mm apart; below -1 mm, of 0.25 m, they overlap: in 40 %, or in 60 %."""
+    arm = sm.load_robot(WRIST)
+    assert overlapping_by_design(arm) == {}
+    assert overlapping_by_design(arm, share=PERHAPS) == {}
+    further = WRIST.replace('lower="-0.1" upper="0.15"', 'lower="-0.15" upper="0.1"')
+    assert overlapping_by_design(sm.load_robot(further)) == {}
+    ((pair, why),) = overlapping_by_design(sm.load_robot(further), share=PERHAPS).items()
+    assert pair == ("yaw", "roll")
+    share = re.fullmatch(r"overlap in (\d+) % of all configurations", why)
+    assert share is not None
+    # 500 samples: within 3 deviations of 0.6, of 0.022 each.
+    assert abs(float(share[1]) - 60.0) < 7.0
 
 
 TELESCOPE = ("mast,a1", "mast,a2", "mast,a3", "a0,a2", "a0,a3", "a1,a3")
@@ -308,8 +382,9 @@ def test_the_tolerance_that_would_do_is_told(tmp_path: Path) -> None:
 def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
     folder = CASES / "collada_unit"
     boxes = []
+    near = ("--circle", "0.03", "--obstacles", folder / "room.json", "--clearance", "0.01")
     for name in ("dae_m_z", "dae_mm_z"):
-        robot = sm.load_robot(folder / f"{name}.urdf")
+        robot = planned(tmp_path, folder / f"{name}.urdf", *near).robot
         model = sm.obstacles.CollisionModel(robot)
         (body,) = (body for body in model.every_body if body.name == "l5")
         boxes.append([body.solid.low, body.solid.high])
@@ -340,22 +415,25 @@ PEERS = {
 
 
 @pytest.mark.parametrize("name", PEERS)
-def test_pose_files_of_peers_are_read_with_their_conventions(name: str) -> None:
+def test_pose_files_of_peers_are_read_with_their_conventions(name: str, tmp_path: Path) -> None:
     places, feed, down = PEERS[name]
-    file = CASES / "tables_of_peers" / name
-    rows = one_seam(file, None, Reading())
-    np.testing.assert_allclose(1e3 * rows.positions, places, atol=DIGITS)
-    (note,) = rows.notes
-    assert re.match(r"(IRBCAM|igus|compas|compas_slicer|motion primitives): ", note)
-    if feed is not None:
-        assert rows.feed is not None
-        np.testing.assert_allclose(rows.feed[:-1], feed)
-    assert (rows.orientation == "rotation") == (down is not None)
-    for turn in rows.values if down is not None else ():
-        np.testing.assert_allclose(turn[:, 2], down, atol=DIGITS)
-        np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=DIGITS)
-    # The shell's --feed counts for what has none, and instead of the file's.
-    assert sm.files.read_path(file, feed=0.05).duration > 1.0
+    asked = ["panda", "--path", CASES / "tables_of_peers" / name]
+    asked += ["--task", "position" if down is None else "pointing"]
+    # The shell's --feed counts for what has none.
+    asked += ["--feed", "0.05"] if feed is None else []
+    framed = places[0][2] == 0.0
+    asked += ["--frame", "0.45,0,0.3,0,0,0"] if framed else []
+    plan, notes = reported(tmp_path, *asked)
+    assert re.search(r"(?m)^(IRBCAM|igus|compas|compas_slicer|motion primitives): ", notes)
+    assert {round(item.asked, 6) for item in plan.path.feeds} == {feed or 0.05}
+    rotations, found = tips_of(plan)
+    found = 1e3 * (found - ([0.45, 0.0, 0.3] if framed else np.zeros(3)))
+    for place in places:
+        # At a corner it is rounded by 1 mm at most, and samples are as far apart as that.
+        assert np.linalg.norm(found - place, axis=1).min() < 1.1
+    np.testing.assert_allclose(found[[0, -1]], [places[0], places[-1]], atol=1e-2)
+    if down is not None:
+        np.testing.assert_allclose(rotations[:, :, 2], np.tile(down, (401, 1)), atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -380,6 +458,46 @@ def test_what_peers_write_besides_is_refused(
     (tmp_path / name).write_text(text)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(tmp_path / name, feed=0.05)
+
+
+_FRAMES = [{"point": [0.45, y, 0.35], "xaxis": [1, 0, 0], "yaxis": [0, -1, 0]}
+           for y in (-0.05, 0.0, 0.05)]  # fmt: skip
+# Of the forms above, written otherwise: name, text, places [mm], and the note.
+ALSO = [
+    ("semicolons.csv", "x;y;z;rz1;ry;rz2;velocity\n0;0;0;0;180;0;20\n40;0;0;90;180;0;20\n",
+     [[0, 0, 0], [40, 0, 0]], "IRBCAM: "),
+    ("numbered.csv", "index,x,y,z,rz1,ry,rz2\n1,0,0,5,0,180,0\n2,0,30,5,0,180,0\n",
+     [[0, 0, 5], [0, 30, 5]], "passed over: index"),
+    ("commas.csv", "X 10,5; Y 0,0; Z 3,25; A 180,0\nX 30,5; Y -4,0; Z 3,25; A 180,0\n",
+     [[10.5, 0, 3.25], [30.5, -4, 3.25]], "igus: "),
+    ("small.csv", "x 1.5 ; y 2 ; z 3\nx 9 ; y 2 ; z 3\n\n", [[1.5, 2, 3], [9, 2, 3]], "igus: "),
+    ("dump.json", json.dumps({"dtype": "compas.data/List", "data": _FRAMES}),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "compas: points in metres, as compas_fab"),
+    ("named.json", json.dumps({"frames": _FRAMES, "speed": 3}),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "passed over: 'speed'"),
+    ("typed.json", json.dumps([{"dtype": "compas.geometry/Frame", "data": one} for one in _FRAMES]),
+     [[450, -50, 350], [450, 0, 350], [450, 50, 350]], "compas: "),
+    ("caps.csv", "Breakpoints,Primitives,Points\n0,moveJ,\"[array([1., 2., 3.])]\"\n"
+     '9,moveL,"[array([1.,\n  8., 3.])]"\n', [[1, 2, 3], [1, 8, 3]], "motion primitives: "),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ALSO, ids=lambda form: form[0])
+def test_forms_of_peers_that_are_written_otherwise(
+    form: tuple[str, str, list[list[float]], str], tmp_path: Path
+) -> None:
+    name, text, places, note = form
+    (tmp_path / name).write_text(text)
+    rows = one_seam(tmp_path / name, None, Reading())
+    np.testing.assert_allclose(1e3 * rows.positions, places, atol=DIGITS)
+    assert note in "\n".join(rows.notes)
+
+
+def test_frames_in_millimetres_are_refused_by_their_form(tmp_path: Path) -> None:
+    far = [{**frame, "point": [450, k, 350]} for k, frame in enumerate(_FRAMES)]
+    (tmp_path / "mm.json").write_text(json.dumps(far))
+    said = complaint("plan", "panda", "--path", tmp_path / "mm.json", "--feed", "0.1")
+    assert "write its places in the unit of its form, or as a table with x_mm,y_mm,z_mm" in said
 
 
 ARCS = {
@@ -616,6 +734,10 @@ def test_a_retimed_plan_keeps_its_limits_at_the_rate_of_a_controller(
     assert "read back: verified" in text
     motion = sm.files.read_motion(file)
     np.testing.assert_allclose(np.diff(motion.t), 1.0 / rate, atol=2e-9)
+    if rate == 500:
+        # Its own plan judges it, as slow as it was written.
+        code, text = invoke("check", file, "--robot", retimed / "rt.npz", "--json")
+        assert (code, json.loads(text)["verified"]) == (0, True)
     # By quintics worked out here, between the samples as well.
     h, u = 1.0 / rate, np.linspace(0.0, 1.0, 41)[:, None, None]
     assert motion.qdd is not None

@@ -358,7 +358,7 @@ def test_what_extrudes_is_a_cut(relative: bool, tmp_path: Path) -> None:
     assert (4, "retract") in loop.events
     assert (0, "prime") in line.events
     assert [event for _, event in loop.events][:2] == ["M104", "M117"]
-    note, _ = loop.notes
+    note, *_ = loop.notes
     assert "line 5: G28 goes to a place of the machine's own" in note
     assert "not known until X, Y and Z are given" in note
     path = sm.files.read_path(tmp_path / "part.gcode", seam="cut 1")

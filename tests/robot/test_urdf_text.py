@@ -120,6 +120,25 @@ def test_what_is_not_found_is_named_with_where_it_was_looked_for(tmp_path: Path)
         sm.obstacles.CollisionModel(sm.load_robot(file))
 
 
+def test_a_package_that_is_called_otherwise_is_named(tmp_path: Path) -> None:
+    """The file says 'hand', and its folder's package.xml 'hand_description'."""
+    package = tmp_path / "hand_repository"
+    (package / "urdf").mkdir(parents=True)
+    (package / "meshes").mkdir()
+    (package / "meshes" / "a.stl").write_text("")
+    (package / "package.xml").write_text("<package><name>hand_description</name></package>")
+    mesh = '<geometry><mesh filename="package://hand/meshes/a.stl"/></geometry>'
+    (package / "urdf" / "arm.urdf").write_text(arm(f"<collision>{mesh}</collision>"))
+    with pytest.raises(sm.errors.RobotError) as no:
+        sm.obstacles.CollisionModel(sm.load_robot(package / "urdf" / "arm.urdf"))
+    said = f"{package} has meshes/a.stl and is called 'hand_description': rename it, or link to it"
+    assert said in str(no.value)
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked" / "hand").symlink_to(package)
+    linked = sm.load_robot(package / "urdf" / "arm.urdf", packages=tmp_path / "linked")
+    assert "hand_repository" in linked.urdf.text or "linked/hand" in linked.urdf.text
+
+
 def test_what_a_simulator_is_told_is_no_part_of_the_robot(tmp_path: Path) -> None:
     """Contact sensors of Gazebo name their bodies by elements that are called as URDF's are."""
     sensor = "<sensor><contact><collision>l3_collision</collision></contact></sensor>"
@@ -262,8 +281,9 @@ def test_an_inertial_that_lacks_something_is_missed_only_by_torques(
     text = arm(f"<inertial>{inertial}</inertial>")
     file.write_text(text.replace('name="l5">', f'name="l5"><inertial>{whole}</inertial>'))
     robot = sm.load_robot(file)
-    (note,) = robot.urdf.notes
+    note, tool = robot.urdf.notes
     assert note.startswith("link 'l4': ")
+    assert tool.startswith("the tool is '")
     path = sm.paths.Line(robot.pose(np.full(7, 0.3)), robot.pose(np.full(7, 0.31)), 1.0)
     problem = sm.Problem(robot, path, "pose", np.full(7, 0.3))
     assert note in problem.remarks

@@ -42,7 +42,8 @@ MOVED_MODULES = {
     "problem.problem.of_arm": "planning.formulation.tolerances",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
     "shop.controllers.commented_lines": "shop.controllers.program_lines",
-    "shop.controllers.read_stretches": "shop.controllers.read_segments",
+    "shop.controllers.read_segments": "shop.controllers.segment_building",
+    "shop.controllers.read_stretches": "shop.controllers.segment_building",
     "shop.controllers.stretches": "shop.controllers.segments",
     "shop.sheet": "shell.sheet",
 }

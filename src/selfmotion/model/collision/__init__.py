@@ -6,6 +6,8 @@ from selfmotion.model.collision.bodies import (
     place_of as place_of,
 )
 from selfmotion.model.collision.by_design import (
+    ALWAYS as ALWAYS,
+    PERHAPS as PERHAPS,
     overlap_warning as overlap_warning,
     overlapping_by_design as overlapping_by_design,
 )
@@ -35,5 +37,6 @@ from selfmotion.model.collision.pairs import (
     disabled_links as disabled_links,
     how_near as how_near,
     srdf_line as srdf_line,
+    srdf_notes as srdf_notes,
 )
 from selfmotion.model.collision.solids import Solid as Solid

@@ -9,17 +9,20 @@ from selfmotion.model.collision.pairs import SAMPLES, srdf_line
 from selfmotion.model.robot import RobotModel
 
 # Share of configurations above which an overlap is by design.
-_ALWAYS = 0.95
+ALWAYS = 0.95
+# The same of what may be by design, and is for the user to say.
+PERHAPS = 0.5
 # The same where the links also overlap in the pose in which the arm is drawn.
 _OFTEN = 0.2
 
 
 def overlapping_by_design(
-    arm: RobotModel, disabled: Sequence[tuple[str, str]] = ()
+    arm: RobotModel, disabled: Sequence[tuple[str, str]] = (), *, share: float = ALWAYS
 ) -> dict[tuple[str, str], str]:
     """Return the pairs of links that overlap in nearly all configurations, or as they are drawn.
 
     With how often and how deep, in words. MoveIt's Setup Assistant calls them Always and Default.
+    Nearly all is a `share` of them.
     """
     if not arm.urdf.has_collisions:
         return {}
@@ -33,13 +36,13 @@ def overlapping_by_design(
     found = {
         (x.first, x.second): f"overlap {x.extent}"
         for x in model.overlapping
-        if not x.is_checked and _ALWAYS <= x.share < 1.0
+        if not x.is_checked and ALWAYS <= x.share < 1.0
     }
-    for pair, share in shares.items():
+    for pair, found_in in shares.items():
         depth = deep.get(frozenset(pair))
-        if share >= _ALWAYS or (depth is not None and share >= _OFTEN):
+        if found_in >= share or (depth is not None and found_in >= _OFTEN):
             drawn_so = "" if depth is None else f", by {1e3 * depth:.1f} mm as they are drawn"
-            found[pair] = f"overlap in {100.0 * share:.0f} % of all configurations{drawn_so}"
+            found[pair] = f"overlap in {100.0 * found_in:.0f} % of all configurations{drawn_so}"
     return found
 
 

@@ -22,7 +22,7 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.model.robot import UrdfShape, unit_of
+from selfmotion.model.robot import UrdfShape, says_unit, unit_of
 from selfmotion.model.task import SE3, as_pose
 
 # An obstacle larger or farther away than this [m] may be in millimetres.
@@ -380,6 +380,13 @@ class Mesh(Obstacle):
     @override
     def files(self) -> tuple[Path, ...]:
         return (self.file,)
+
+    @property
+    def note(self) -> str:
+        """What its file is taken to be in where it says no unit; "" where that is known."""
+        if self.scale != 1.0 or says_unit(self.file):
+            return ""
+        return f"{self.label}: {self.file.name} says no unit: taken for metres (else: scale)"
 
     def _metres(self) -> float:
         """Return the metres of a unit of the file."""

@@ -192,8 +192,8 @@ def disabled_links(
     ----------
     srdf : path
         An SRDF, or a xacro of one, which is expanded.
-        arguments : dict, optional
-            Those of the arm's own xacro; undeclared ones are left out.
+    arguments : dict, optional
+        Those of the arm's own xacro; undeclared ones are left out.
     packages : sequence of path
         Folders that are searched for packages.
 
@@ -202,22 +202,8 @@ def disabled_links(
     CollisionError
         The SRDF cannot be read, disables nothing, or a pair of it is not complete.
     """
-    file = Path(srdf)
-    try:
-        root = ElementTree.parse(file).getroot()
-        if any("xacro" in tag.tag for tag in root.iter() if isinstance(tag.tag, str)):
-            near = Packages(file, tuple(map(str, packages)))
-            root = ElementTree.fromstring(expand(file, arguments or {}, near, of_others=True))
-    except RobotError as error:
-        raise CollisionError(str(error)) from error
-    except OSError as error:
-        raise CollisionError(f"{srdf}: SRDF cannot be read: {error.strerror or error}") from error
-    except ElementTree.ParseError as error:
-        raise CollisionError(f"{srdf}: SRDF is not well-formed XML: {error}") from error
-    if root.tag != "robot":
-        raise CollisionError(f"{srdf}: the root element is <{root.tag}>, expected <robot>")
     pairs = []
-    for tag in root.iter("disable_collisions"):
+    for tag in _srdf_root(srdf, arguments, packages).iter("disable_collisions"):
         first, second = tag.get("link1", ""), tag.get("link2", "")
         if not (first and second):
             raise CollisionError(
@@ -232,6 +218,43 @@ def disabled_links(
         )
     # A link with itself is no pair; some files have it, and other programs pass over it.
     return tuple((first, second) for first, second in pairs if first != second)
+
+
+def srdf_notes(
+    srdf: str | Path,
+    arguments: Mapping[str, str] | None = None,
+    packages: Sequence[str | Path] = (),
+) -> tuple[str, ...]:
+    """Return a note of the elements of an SRDF that are not read; see `disabled_links`."""
+    root = _srdf_root(srdf, arguments, packages)
+    others = dict.fromkeys(tag.tag for tag in root if tag.tag != "disable_collisions")
+    if not others:
+        return ()
+    return (
+        f"{srdf}: <disable_collisions> is what is read; passed over: "
+        f"{', '.join(f'<{name}>' for name in others)}",
+    )
+
+
+def _srdf_root(
+    srdf: str | Path, arguments: Mapping[str, str] | None, packages: Sequence[str | Path]
+) -> ElementTree.Element:
+    """Return the element <robot> of an SRDF, expanded where it is xacro."""
+    file = Path(srdf)
+    try:
+        root = ElementTree.parse(file).getroot()
+        if any("xacro" in tag.tag for tag in root.iter() if isinstance(tag.tag, str)):
+            near = Packages(file, tuple(map(str, packages)))
+            root = ElementTree.fromstring(expand(file, arguments or {}, near, of_others=True))
+    except RobotError as error:
+        raise CollisionError(str(error)) from error
+    except OSError as error:
+        raise CollisionError(f"{srdf}: SRDF cannot be read: {error.strerror or error}") from error
+    except ElementTree.ParseError as error:
+        raise CollisionError(f"{srdf}: SRDF is not well-formed XML: {error}") from error
+    if root.tag != "robot":
+        raise CollisionError(f"{srdf}: the root element is <{root.tag}>, expected <robot>")
+    return root
 
 
 # How often bodies overlap in sampled configurations, and how often their convex hulls alone do.

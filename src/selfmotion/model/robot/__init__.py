@@ -18,7 +18,7 @@ from selfmotion.model.robot.chain import (
     null_space as null_space,
 )
 from selfmotion.model.robot.chain_series import ChainSeries as ChainSeries, ToolRates as ToolRates
-from selfmotion.model.robot.collada import unit_of as unit_of
+from selfmotion.model.robot.collada import says_unit as says_unit, unit_of as unit_of
 from selfmotion.model.robot.configurations import mean_lever as mean_lever
 from selfmotion.model.robot.coordinates import (
     Coordinate as Coordinate,

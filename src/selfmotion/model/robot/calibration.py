@@ -57,7 +57,8 @@ def calibrated_urdf(urdf: Urdf, file: str | Path, prefix: str = "") -> Urdf:
         _write(joints[name], pose, f"{urdf.source}: joint '{name}'")
     if not prefix:
         root.set(CALIBRATION, str(path.resolve()))
-    return dataclasses.replace(urdf, text=ElementTree.tostring(root, encoding="unicode"))
+    text = ElementTree.tostring(root, encoding="unicode")
+    return dataclasses.replace(urdf, text=text, notes=(*urdf.notes, f"{path}: {measured.units}"))
 
 
 def calibrated_robot(

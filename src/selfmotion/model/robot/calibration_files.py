@@ -55,6 +55,16 @@ class CalibrationFile:
     placements: Mapping[str, pin.SE3] = field(default_factory=dict)
     offsets: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def units(self) -> str:
+        """The units that its numbers are taken to be in, in words: no such file says them."""
+        if self.frames or self.deltas is not None:
+            return "lengths are taken for metres and angles for radians, as Universal Robots has it"
+        return (
+            "position is taken for metres, rpy for radians about fixed axes, offsets for radians "
+            "(metres of joints that slide)"
+        )
+
 
 def read_calibration(file: Path) -> CalibrationFile:
     """Read a calibration from a ``.yaml``, ``.toml`` or ``.conf`` file.

@@ -8,6 +8,17 @@ _HEAD = 100_000
 _UNIT = re.compile(rb"<unit\b[^>]{0,200}?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)\s*[\"']")
 
 
+def says_unit(file: Path) -> bool:
+    """Whether a mesh file says in which unit it is: a ``.dae`` with one, no other format."""
+    if file.suffix.lower() != ".dae":
+        return False
+    try:
+        with file.open("rb") as stream:
+            return _UNIT.search(stream.read(_HEAD)) is not None
+    except OSError:
+        return True
+
+
 def unit_of(file: Path) -> float:
     """Return the metres of a length 1 in a mesh file: of a ``.dae`` its unit, else 1.
 

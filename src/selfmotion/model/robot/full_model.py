@@ -120,11 +120,12 @@ def _fault(urdf: Urdf, file: str) -> str:
         scheme, _, rest = file.rpartition("://")
         if scheme not in ("package", "model"):
             return f"no such mesh file{_ELSEWHERE * bool(scheme)}"
-        near, name = Packages(Path(urdf.source), urdf.packages), rest.partition("/")[0]
+        near = Packages(Path(urdf.source), urdf.packages)
+        name, _, inside = rest.partition("/")
         folder = near.folder(name)
         if folder is not None:
             return f"no such mesh file in package '{name}', {folder}"
-        return f"no such mesh file, {near.searched(name)}"
+        return f"no such mesh file, {near.called_otherwise(name, inside) or near.searched(name)}"
     try:
         coal.MeshLoader().load(str(found), np.ones(3))
     except (RuntimeError, ValueError) as error:

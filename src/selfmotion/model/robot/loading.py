@@ -27,6 +27,7 @@ from selfmotion.model.robot.named import NAMED_ARMS, NAMED_PARTS, published, rea
 from selfmotion.model.robot.pinocchio_model import urdf_text_of
 from selfmotion.model.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
 from selfmotion.model.robot.urdf_text import Packages, expand, is_xacro
+from selfmotion.model.robot.urdf_unsaid import units_unsaid
 from selfmotion.model.task import as_pose
 
 # Name of a URDF's text in messages.
@@ -131,8 +132,12 @@ def load_robot(
         else _single(robot, geometry, base, on, arguments or {}, folders, calibration)
     )
     urdf = source.urdf
-    if tool is None:
-        tool = source.tool or _only_leaf(urdf)
+    if tool is None and source.tool is None:
+        tool = _only_leaf(urdf)
+        note = f"the tool is '{tool}', the only link with none behind it (else: tool, --tool)"
+        urdf = dataclasses.replace(urdf, notes=(*urdf.notes, note))
+    elif tool is None:
+        tool = source.tool
     frames = _tool_frames(tool, urdf)
     urdf = with_bodies(urdf, frames[0], bodies)
     if tool_offset is not None:
@@ -200,13 +205,19 @@ def _read(
         _check_no_arguments(source, arguments)
         is_model = isinstance(robot, pin.Model)
         text = urdf_text_of(robot, geometry, source) if is_model else str(robot).strip()
-        return _Source(urdf_of_file(text, Packages(Path(source), packages)), None)
+        urdf = urdf_of_file(text, Packages(Path(source), packages))
+        return _Source(urdf if is_model else _with_units(urdf), None)
     if isinstance(robot, str) and robot in known:
         _check_no_arguments(robot, arguments)
         arm = known[robot]
         return _Source(read_named(arm), arm.tool, arm.touching, published(robot))
     urdf = _read_file(Path(robot), arguments, str(robot), packages)
-    return _Source(urdf, None)
+    return _Source(_with_units(urdf), None)
+
+
+def _with_units(urdf: Urdf) -> Urdf:
+    """Return a URDF with a note of meshes that say no unit; of arms by name it is known."""
+    return dataclasses.replace(urdf, notes=(*urdf.notes, *units_unsaid(urdf.text)))
 
 
 def _called(robot: str | Path | pin.Model) -> str:

@@ -6,13 +6,15 @@ them.
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import RobotError, nearest, shown
+from selfmotion.model.robot.collada import says_unit
 from selfmotion.model.robot.urdf import (
     BASE_JOINT,
     BODY_JOINT,
@@ -125,12 +127,22 @@ def with_bodies(urdf: Urdf, tool: str, bodies: Any) -> Urdf:
                 f"{nearest(carrier, urdf.links)}; links: {', '.join(urdf.links)}"
             )
         shapes = body.urdf_shapes()
+        urdf = dataclasses.replace(urdf, notes=(*urdf.notes, *_units_of(body, shapes)))
         elements = [
             _element(kind, body.shape, item) for kind in ("visual", "collision") for item in shapes
         ]
         joint = f"{BODY_JOINT}{body.name}"
         urdf = _joined(urdf, joint, carrier, body.name, body.name, body.pose, elements)
     return urdf
+
+
+def _units_of(body: CarriedBody, shapes: Sequence[UrdfShape]) -> Iterator[str]:
+    """Yield notes of meshes in files that say no unit, and are not scaled."""
+    for item in shapes:
+        scale = set(map(float, item.values.get("scale", "1").split()))
+        file = Path(item.values.get("filename", ""))
+        if item.tag == "mesh" and scale == {1.0} and not says_unit(file):
+            yield f"{body.label}: {file.name} says no unit: taken for metres (else: scale)"
 
 
 def _element(kind: str, shape: str, item: UrdfShape) -> ElementTree.Element:

@@ -26,6 +26,7 @@ from selfmotion.model.robot.urdf_elements import (
     split_planar,
     without_lacking,
     without_limits,
+    zero_speeds,
 )
 from selfmotion.model.robot.urdf_text import (
     Packages,
@@ -34,6 +35,11 @@ from selfmotion.model.robot.urdf_text import (
     make_single_angles,
     parsed_by_yourdfpy,
     root_of,
+)
+from selfmotion.model.robot.urdf_unsaid import (
+    angles_in_degrees,
+    axes_unsaid,
+    limits_passed_over,
 )
 
 # Fixed joint of a placed base.
@@ -122,7 +128,7 @@ class Urdf:
     parts : tuple of UrdfPart
         Its parts; empty for a single robot, or one from a saved plan.
     notes : tuple of str
-        Elements that are not drawn or weighed, and causes.
+        Elements that are not drawn, weighed or read, and what is taken where it says nothing.
     packages : tuple of str
         Folders of packages that the user named.
     lacking_efforts : tuple of str
@@ -323,11 +329,16 @@ def parse_urdf(
     for told in root.findall("gazebo"):
         root.remove(told)
     notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]
+    notes += [*axes_unsaid(root), *limits_passed_over(root), *angles_in_degrees(root)]
+    zero = zero_speeds(root)
     unsaid = without_limits(root)
     for key, what in (("velocity", "speeds are"), ("effort", "torques are")):
         if unsaid[key]:
             names = ", ".join(f"'{name}'" for name in unsaid[key])
             notes.append(f"{names}: <limit> without {key}: taken for none, {what} not limited")
+    if zero:
+        names = ", ".join(f"'{name}'" for name in zero)
+        notes.append(f"{names}: <limit> with velocity 0: taken for none, speeds are not limited")
     check_link_elements(root, source)
     check_joint_elements(root, source)
     bare = without_lacking(copy.deepcopy(root))

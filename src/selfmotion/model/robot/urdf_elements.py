@@ -131,6 +131,17 @@ def without_limits(root: ElementTree.Element) -> dict[str, list[str]]:
     return found
 
 
+def zero_speeds(root: ElementTree.Element) -> list[str]:
+    """Return the joints whose ``<limit>`` says velocity 0, which is read as none."""
+    limits = {joint.get("name", ""): joint.find("limit") for joint in root.findall("joint")
+              if joint.get("type") in _MOVING}  # fmt: skip
+    return [
+        name
+        for name, limit in limits.items()
+        if limit is not None and number_in(limit.get("velocity", "")) == 0.0
+    ]
+
+
 def split_planar(root: ElementTree.Element, source: str) -> list[str]:
     """Turn planar joints with limits into x, y and a turn about the axis, in place; return notes.
 
@@ -173,14 +184,14 @@ def split_planar(root: ElementTree.Element, source: str) -> list[str]:
             given = dict(limit.attrib)
             if k == 2:
                 given = {key: value for key, value in given.items() if key == "effort"}
-                given["velocity"] = "0"
             ElementTree.SubElement(one, "limit", given)
             root.insert(at + k, one)
             if k < 2:
                 root.append(ElementTree.Element("link", name=part))
+        plane = "; no <axis>, its plane is that of x and y" if axis is None else ""
         notes.append(
             f"joint '{name}' is planar: read as {', '.join(parts)}; its limits are those of the "
-            f"first two, the turn has none"
+            f"first two, the turn has none{plane}"
         )
     return notes
 

@@ -89,6 +89,21 @@ class Packages:
             f"has it: --packages DIR (packages=)"
         )
 
+    def called_otherwise(self, name: str, inside: str) -> str:
+        """Return in words which folder above has a file of a package of another name; "" for none.
+
+        With a remedy: what finds packages goes by their names.
+        """
+        folder = next((folder for folder in self._above if is_file(folder / inside)), None)
+        if folder is None:
+            return ""
+        said = _package_name(folder) or folder.name
+        return (
+            f"package '{name}' is nowhere, but {folder} has {inside} and is called '{said}': "
+            f"rename it, or link to it by that name (ln -s {folder} DIR/{name}) and give "
+            f"--packages DIR (packages=)"
+        )
+
     @cached_property
     def _above(self) -> tuple[Path, ...]:
         """All folders above the file but the root, nearest first."""

@@ -49,6 +49,8 @@ class PlanRequest:
         Of parts: ``retreat``, ``axis`` and ``ramp`` of `plan_in_parts`.
     keep : mapping, optional
         Costs that the fastest motion keeps; see `fastest`.
+    notes : tuple of str
+        What was taken for granted, or passed over, of the files that its own names.
     """
 
     problem: Problem
@@ -60,9 +62,15 @@ class PlanRequest:
     goal: str = "best"
     parts: Mapping[str, Any] | None = None
     keep: Mapping[str, float] | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         as_choice(self.goal, "goal", GOALS)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Notes before planning: its own, and `Problem.remarks`."""
+        return (*self.notes, *self.problem.remarks)
 
     @property
     def settings(self) -> dict[str, Any]:

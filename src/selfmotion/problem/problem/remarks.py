@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Requirement
-from selfmotion.model.collision import Body, Obstacle, Solid, overlap_warning
+from selfmotion.model.collision import Body, Mesh, Obstacle, Solid, overlap_warning
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import TURN_NOTE, spread_along
 from selfmotion.model.robot import RobotModel, mounting_of
@@ -124,6 +124,7 @@ def remarks_on(
                 f"Python {kind}(…)"
             )
     bodies = [body for item in requirements for body in item.obstacles]
+    yield from (body.note for body in bodies if isinstance(body, Mesh) and body.note)
     yield from inside_remarks(robot, follows, bodies)
 
 

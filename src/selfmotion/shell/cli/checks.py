@@ -1,4 +1,4 @@
-"""What `selfmotion check` judges: plans, motions of files, programs of controllers."""
+"""Verification by `selfmotion check`: plans, motions of files, programs of controllers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,10 +11,11 @@ import typer
 import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
+from selfmotion.model.collision import srdf_notes
 from selfmotion.problem.problem import KEPT, NO_OVERLAP
 from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
-from selfmotion.shell.documents import read_joint_limits
+from selfmotion.shell.documents import joint_limit_notes, read_joint_limits
 from selfmotion.shop import controllers
 
 _Near = Mapping[str, Extreme]
@@ -86,9 +87,9 @@ class Read(NamedTuple):
         if program is None:
             return ()
         return (
-            *([program.begins_elsewhere] if program.begins_elsewhere else []),
-            *controllers.misswitched(program, None),
-            *controllers.unlike(program, robot, constraints),
+            *([program.start_fault] if program.start_fault else []),
+            *controllers.switching_faults(program, None),
+            *controllers.differing_facts(program, robot, constraints),
         )
 
 
@@ -109,6 +110,24 @@ def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.Robot
     return Read(motion, within, program)
 
 
+def notes_of(
+    file: Path,
+    degrees: bool,
+    robot: sm.RobotModel,
+    joint_limits: Path | None,
+    obstacles: Path | None,
+    srdf: Path | None,
+) -> tuple[str, ...]:
+    """Return what is taken for granted, or passed over, of the files of a check."""
+    bodies = () if obstacles is None else options.read_obstacles(obstacles)
+    return (
+        *([] if is_program(file) else controllers.motion_notes(file, degrees=degrees)),
+        *([] if joint_limits is None else joint_limit_notes(joint_limits, robot)),
+        *([] if srdf is None else srdf_notes(srdf)),
+        *(body.note for body in bodies if isinstance(body, sm.obstacles.Mesh) and body.note),
+    )
+
+
 def is_program(file: Path) -> bool:
     """Whether a file is a program of a controller."""
     return file.suffix.lower() in controllers.READ_PROGRAMS
@@ -121,13 +140,13 @@ def with_failures(certificate: sm.Certificate, texts: Sequence[str]) -> sm.Certi
 
 def left_to_controller(program: controllers.ControllerProgram | None) -> dict[str, str]:
     """Return what a verdict on a program leaves to the controller, for JSON; of others nothing."""
-    return {} if program is None else {"not_judged": controllers.of_the_controller(program)}
+    return {} if program is None else {"not_judged": controllers.controller_note(program)}
 
 
-def tell_of_controller(program: controllers.ControllerProgram | None) -> None:
+def print_controller_note(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
     if program is not None and program.within is not None:
-        terminal.print(controllers.of_the_controller(program), markup=False, soft_wrap=True)
+        terminal.print(controllers.controller_note(program), markup=False, soft_wrap=True)
 
 
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
@@ -138,7 +157,7 @@ def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
     return sm.calibrated(replace(problem, start="free"), calibration)
 
 
-def tell_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
+def print_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
     """Print how far the tool of a calibrated arm is from where the arm as drawn has it."""
     position, rotation = sm.off_nominal(robot, motion)
     text = (
@@ -164,7 +183,7 @@ def of_plan(
         found = problem.certify(
             plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
         )
-        tell_difference(problem.robot, plan.trajectory)
+        print_difference(problem.robot, plan.trajectory)
         asked = (*problem.requirements, *besides)
         return found, near(problem.robot, plan.trajectory, asked), problem.robot
     besides = requirements(plan.robot, *judged)
@@ -187,8 +206,18 @@ def of_problem(
 
     And the program that it is.
     """
-    problem, tolerance, ending = _asked_by(Path(asked), progress)
+    problem, tolerance, ending, plan = _asked_by(Path(asked), progress)
     given = read(file, degrees, within, problem.robot)
+    if plan is not None and given.program is None:
+        slower = controllers.slowed_as(plan, given.motion)
+        if slower is not plan:
+            times = slower.trajectory.duration / plan.trajectory.duration
+            text = (
+                f"note: judged by the plan as slow as its samples at this rate need, {times:.4f} "
+                f"times as long, as export --rate writes it"
+            )
+            stages.print(text, markup=False, soft_wrap=True)
+            problem = slower.problem
     motions, program = given.ways(problem.path, problem.robot), given.program
     against = given.besides(problem.robot, problem.constraints)
     if program is not None:
@@ -199,14 +228,14 @@ def of_problem(
             stages.print(f"note: {controllers.shift_note(program)}", markup=False, soft_wrap=True)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
-        tell_difference(problem.robot, motions[0])
+        print_difference(problem.robot, motions[0])
     besides = requirements(problem.robot, *judged)
     allowed, robot = given.within or tolerance, problem.robot
 
     def certify(motion: sm.Trajectory) -> sm.Certificate:
         return problem.certify(motion, allowed, ending, besides, progress)
 
-    lines = replace(problem, constraints=controllers.what_lines_keep(problem.constraints))
+    lines = replace(problem, constraints=controllers.constraints_of_lines(problem.constraints))
 
     def certify_lines(motion: sm.Trajectory) -> sm.Certificate:
         return lines.certify(motion, allowed, ending, besides, progress)
@@ -217,13 +246,18 @@ def of_problem(
     return certificate, close, robot, program
 
 
-def _asked_by(file: Path, progress: Progress) -> tuple[sm.Problem, sm.Tolerance | None, str]:
-    """Return the problem of a problem file or of a kept plan, its tolerance, how that ended."""
+def _asked_by(
+    file: Path, progress: Progress
+) -> tuple[sm.Problem, sm.Tolerance | None, str, sm.Plan | None]:
+    """Return the problem of a problem file or of a saved plan, its tolerance, how that ended.
+
+    And the plan, where it is one.
+    """
     if file.suffix == ".npz":
         plan = sm.load_plan(file, progress=progress)
-        return plan.problem, plan.tolerance, plan.report.ending
+        return plan.problem, plan.tolerance, plan.report.ending, plan
     job = sm.files.read_job(file)
-    return job.problem, job.tolerance, ""
+    return job.problem, job.tolerance, "", None
 
 
 def near(

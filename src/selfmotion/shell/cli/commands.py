@@ -25,7 +25,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
-from selfmotion.shell.documents import example_texts, json_schema
+from selfmotion.shell.documents import MAYBE, example_texts, json_schema
 from selfmotion.shop import controllers
 
 
@@ -64,8 +64,8 @@ def plan(
         "deadline": deadline,
     }
     given = {key: value for key, value in asked.items() if value is not None}
-    remarks = job.problem.remarks
-    outputs.tell(remarks)
+    remarks = job.remarks
+    outputs.print_notes(remarks)
     job.check_used(job.goal)
     if job.goal == "parts":
         options.refuse({"from": warm, **given}, "a motion in parts", "its own")
@@ -124,6 +124,8 @@ def init(
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
+    if MAYBE in text:
+        outputs.print_notes([f"links that overlap often are left out in {file}: {MAYBE}"])
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
@@ -194,7 +196,7 @@ def check(
         options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")
         checks.of_program(file, Path(robot), within, as_json, verbose)
-    program = None
+    program, notes = None, list[str]()
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
@@ -207,6 +209,7 @@ def check(
             certificate, near, arm, program = checks.of_problem(
                 file, robot, degrees, within, judged, display.stage, calibration
             )
+            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
         else:
             if robot is None or path is None:
                 raise sm.errors.ProblemError(
@@ -241,12 +244,16 @@ def check(
             )
             certificate = checks.with_failures(certificate, found.besides(arm, ()))
             near = checks.near(arm, motion, asked)
+            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
+            notes += [*arm.urdf.notes, *followed.notes]
+    outputs.print_notes(notes)
     if as_json:
         data = summaries.certificate_json(certificate, near)
+        data["remarks"] = [*notes, *data["remarks"]]
         print_json(data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
-        checks.tell_of_controller(program)
+        checks.print_controller_note(program)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
@@ -405,8 +412,8 @@ def fastest(
         pairs = [_factor(text) for text in keep]
         options.refuse_twice("--keep", [kind for kind, _ in pairs])
         given["keep"] = {**(job.keep or {}), **dict(pairs)}
-    remarks = job.problem.remarks
-    outputs.tell(remarks)
+    remarks = job.remarks
+    outputs.print_notes(remarks)
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(

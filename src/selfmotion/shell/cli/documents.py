@@ -1,4 +1,4 @@
-"""What the options of ``selfmotion plan`` say, as the table of a problem file."""
+"""Options of ``selfmotion plan`` as the table of a problem file."""
 
 import re
 import tomllib
@@ -215,7 +215,7 @@ class Shell:
         return found
 
 
-# What a table that is made of options calls an entry of --obstacles.
+# Key of an entry of --obstacles in a table made of options.
 _ENTRY = re.compile(r"constraints\[\d+\]\.obstacles(\[\d+\])")
 # Options of the shell that say how --path is read; those of `plan` and of `check`.
 OF_PATH = (
@@ -225,7 +225,7 @@ OF_PATH = (
 )
 
 
-# How the tool leans from the path, and leaves it to turn.
+# Options of the tool's inclination along the path, and of its lift in corners.
 _LEANS = ("lead", "tilt", "lift")
 # Starts that have a name, as in problem files.
 _STARTS = ("home", "dexterous", "free")
@@ -345,7 +345,7 @@ def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files
     job = seam_job_of(document, file, allow_code=allow_code)
     # A file with code of its own is not read twice for this.
     if not allow_code:
-        _tell_flip_of_seams(document, file, job)
+        _print_flip_of_seams(document, file, job)
     return job
 
 
@@ -363,12 +363,12 @@ def _with_settings(
 ) -> sm.files.PlanRequest:
     _set(document, settings)
     job = job_of(document, file, allow_code=allow_code)
-    _tell_left_out(document, file)
-    _tell_flip(document, file, job)
+    _print_left_out(document, file)
+    _print_flip(document, file, job)
     return job
 
 
-def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanRequest) -> None:
+def _print_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanRequest) -> None:
     """Print that normals seem to point the other way, where only so the path is in reach."""
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):
@@ -380,10 +380,10 @@ def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanRe
         return
     other = job_of({**document, "path": _flipped(path)}, file).problem
     if _is_in_reach(other.robot, other.path, other.task):
-        _say_flip("the path", path)
+        _flip_text("the path", path)
 
 
-def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.SeamJob) -> None:
+def _print_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.SeamJob) -> None:
     """Print the same of a job's first seam."""
     seams, first = document["seams"], job.seams[0]
     listed = isinstance(seams, list)
@@ -395,14 +395,14 @@ def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.Seam
     turned = [{**seams[0], "path": _flipped(path)}, *seams[1:]] if listed else _flipped(seams)
     other = seam_job_of({**document, "seams": turned}, file)
     if _is_in_reach(other.robot, other.seams[0].path, sm.Task(first.task)):
-        _say_flip(f"seam '{first.name}'", path)
+        _flip_text(f"seam '{first.name}'", path)
 
 
 def _flipped(table: dict[str, Any]) -> dict[str, Any]:
     return {**table, "flip_normals": not table.get("flip_normals", False)}
 
 
-def _say_flip(what: str, table: dict[str, Any]) -> None:
+def _flip_text(what: str, table: dict[str, Any]) -> None:
     flips = not table.get("flip_normals", False)
     said = "with --flip-normals (flip_normals)" if flips else "without flipping the normals"
     stages.print(
@@ -424,7 +424,7 @@ def _is_in_reach(robot: sm.RobotModel, path: sm.paths.Path, task: sm.Task) -> bo
     return True
 
 
-def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:
+def _print_left_out(document: dict[str, Any], file: Path | None) -> None:
     """Print which events of a table or a program of a machine tool a path leaves out."""
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):

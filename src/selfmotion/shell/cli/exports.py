@@ -76,8 +76,8 @@ def export(
             f"{file}: --parts is of a cell's plan, which this is not; leave it out"
         )
     _check_verified(made, force, as_json)
-    _tell_followers(made.robot, out, form)
-    outputs.tell_base(made.robot, asked)
+    _print_followers(made.robot, out, form)
+    outputs.print_base(made.robot, asked)
     if isinstance(made, sm.Plan) and files.are_readable:
         made = _slow_enough(made, rate)
     coarsest = None
@@ -93,8 +93,8 @@ def export(
     if all(reread.is_message(target, form) for target in streamed):
         rate = coarsest if rate is None else rate
     if coarsest is not None and not as_json:
-        terminal.print(reread.told_coarsest(coarsest), markup=False, soft_wrap=True)
-    _tell_held(made.robot)
+        terminal.print(reread.coarsest_text(coarsest), markup=False, soft_wrap=True)
+    _print_held(made.robot)
     _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
 
 
@@ -216,7 +216,7 @@ def _slow_enough(plan: sm.Plan, rate: float | None) -> sm.Plan:
     return found
 
 
-def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
+def _print_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
     """Print which joints are in no file, because they mimic others."""
     following = controllers.followers(robot)
     if following and any(
@@ -231,7 +231,7 @@ def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> 
         )
 
 
-def _tell_held(robot: sm.RobotModel) -> None:
+def _print_held(robot: sm.RobotModel) -> None:
     """Print which joints have to stand where while the motion runs."""
     text = controllers.held_in_words(robot)
     if text:
@@ -266,19 +266,19 @@ def _finish(
     sampled: bool,
 ) -> NoReturn:
     """Print what was written, and end."""
-    miss = None
+    deviation = None
     if sampled and isinstance(made, sm.Plan):
-        miss = controllers.linear_miss(made, rate)
+        deviation = controllers.linear_deviation(made, rate)
     if as_json:
         data: dict[str, Any] = {"verified": sound, "written": verdicts}
-        print_json(data if miss is None else data | {"linear_miss": miss._asdict()})
+        print_json(data if deviation is None else data | {"linear_miss": deviation._asdict()})
         raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
     for name, verdict in verdicts.items():
         terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
-        outputs.tell_large(Path(name), terminal, given_rate=rate is not None)
-    if miss is not None:
+        outputs.print_large(Path(name), terminal, given_rate=rate is not None)
+    if deviation is not None:
         terminal.print(
-            reread.told_straight(miss),
+            reread.straight_text(deviation),
             markup=False,
             soft_wrap=True,
         )

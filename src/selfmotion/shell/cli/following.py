@@ -1,4 +1,4 @@
-"""What `selfmotion follow` and `selfmotion track` do: an arm in the loop, real or simulated."""
+"""Commands `selfmotion follow` and `selfmotion track`: the loop with a real or simulated arm."""
 
 import socket
 import time
@@ -23,8 +23,10 @@ from selfmotion.planning.search import reachable
 
 # What `selfmotion follow` does: states of an arm come by UDP, and segments go back.
 
-# What a datagram holds at most, and how long one is waited for at a time [s].
-_LARGEST, _LOOK = 65_507, 0.2
+# Largest size of a UDP datagram [bytes].
+_LARGEST_DATAGRAM = 65_507
+# Time-out of a receive [s].
+_TIMEOUT = 0.2
 _FLOAT = np.dtype("<f8")
 # A tool farther than this from its path is off it [m, rad].
 _OFF = np.array([1e-4, 1e-3])
@@ -107,10 +109,10 @@ class Link:
         """Send a segment, and note what became of it."""
         rows = np.column_stack([segment.t + self._first, segment.q, segment.qd, segment.qdd])
         data = rows.astype(_FLOAT).tobytes()
-        if len(data) > _LARGEST:
+        if len(data) > _LARGEST_DATAGRAM:
             raise sm.errors.ProblemError(
                 f"a segment of {len(rows)} cycles takes {len(data)} bytes, more than a datagram "
-                f"holds ({_LARGEST}): give a longer --cycle"
+                f"holds ({_LARGEST_DATAGRAM}): give a longer --cycle"
             )
         self.port.sendto(data, self._peer)
         self.took.append(time.perf_counter() - self._since)
@@ -128,7 +130,7 @@ class Link:
 
     @property
     def dof(self) -> int:
-        """How many joints there are."""
+        """Number of joints."""
         return int(self.limits.shape[1])
 
     def _note_off(self, segment: realtime.Segment) -> None:
@@ -143,7 +145,7 @@ class Link:
     def _newest(self) -> bytes | None:
         """Return the newest state or the end; None where nothing came for a while."""
         found: bytes | None = None
-        wait = _LOOK
+        wait = _TIMEOUT
         while found != b"" and select([self.port], [], [], wait)[0]:
             later = self._sound(*self.port.recvfrom(65_536))
             found, wait = found if later is None else later, 0.0
@@ -166,7 +168,7 @@ class Link:
 
     @property
     def expected(self) -> str:
-        """How long a state is, in words."""
+        """Expected length of a state datagram, in words."""
         count = 1 + 2 * self.dof
         return (
             f"a state has {count * _FLOAT.itemsize}: {count} doubles (time, {self.dof} positions, "
@@ -179,7 +181,7 @@ class Link:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What came of it, for programs."""
+        """Summary of the run, as JSON-safe values."""
         return {
             "ended": self.ended,
             "segments": dict(self.flags),
@@ -277,15 +279,27 @@ def show_link(link: Link, console: Console) -> None:
 
 # What `selfmotion track` shows: a conveyor, a push, a ball that appears.
 
-# What the conveyor carries the path by at most [m], and how long it takes there and back [s].
-_REACH, _TURN = 0.12, 12.0
-# The tool draws this circle on it [m], in so many seconds.
-_RADIUS, _ROUND = 0.06, 6.0
-# From when to when the arm is pushed off its command [s], how far [rad], and how fast [s].
-PUSHED, _FAR, _RISE = (3.0, 4.5), 0.03, 0.2
-# When the ball appears [s], how large it is [m], and the distance that is kept from it [m].
-APPEARS, _BALL, _DISTANCE = 6.0, 0.06, 0.005
-# Where it is before [m].
+# Amplitude of the conveyor's motion [m].
+_CONVEYOR_AMPLITUDE = 0.12
+# Period of the conveyor's motion [s].
+_CONVEYOR_PERIOD = 12.0
+# Radius of the circle on the conveyor [m].
+_CIRCLE_RADIUS = 0.06
+# Period of the circle [s].
+_CIRCLE_PERIOD = 6.0
+# Begin and end of the disturbance of the joints [s].
+PUSHED = (3.0, 4.5)
+# Amplitude of the disturbance [rad].
+_PUSH_AMPLITUDE = 0.03
+# Rise time of the disturbance [s].
+_PUSH_RISE = 0.2
+# Time at which the ball appears [s].
+APPEARS = 6.0
+# Radius of the ball [m].
+_BALL_RADIUS = 0.06
+# Clearance from the ball [m].
+_BALL_CLEARANCE = 0.005
+# Pose of the ball before it appears, out of the way.
 _AWAY = SE3(np.eye(3), np.array([0.0, 0.0, 50.0]))
 
 
@@ -306,20 +320,22 @@ class Conveyor:
     def __init__(self, robot: sm.RobotModel, start: Array, ball: Array, seconds: float) -> None:
         self._circle = sm.paths.Circle.around(
             robot.pose(start),
-            _RADIUS,
+            _CIRCLE_RADIUS,
             seconds + 10.0,
             normal=(0.0, 0.0, 1.0),
-            turns=(seconds + 10.0) / _ROUND,
+            turns=(seconds + 10.0) / _CIRCLE_PERIOD,
         )
-        self._push = _FAR * np.where(np.arange(robot.dof) % 2, 1.0, -1.0)
+        self._push = _PUSH_AMPLITUDE * np.where(np.arange(robot.dof) % 2, 1.0, -1.0)
         self._ball = SE3(np.eye(3), np.asarray(ball))
 
     def path(self, t: float) -> sm.paths.Path:
         """Return the circle where the conveyor is, going on as fast as it is now."""
         # The conveyor's drive is measured: place and velocity of a sine.
-        phase = 2.0 * np.pi * t / _TURN
-        place = np.array([0.0, _REACH * np.sin(phase), 0.0])
-        velocity = np.array([0.0, _REACH * 2.0 * np.pi / _TURN * np.cos(phase), 0.0])
+        phase = 2.0 * np.pi * t / _CONVEYOR_PERIOD
+        place = np.array([0.0, _CONVEYOR_AMPLITUDE * np.sin(phase), 0.0])
+        velocity = np.array(
+            [0.0, _CONVEYOR_AMPLITUDE * 2.0 * np.pi / _CONVEYOR_PERIOD * np.cos(phase), 0.0]
+        )
         return realtime.Conveyed(self._circle, velocity, place - t * velocity)
 
     def obstacles(self, t: float) -> Mapping[str, SE3]:
@@ -328,7 +344,7 @@ class Conveyor:
 
     def pushed(self, t: float) -> Array:
         """Return the push."""
-        since = np.clip((t - np.array(PUSHED)) / _RISE, 0.0, 1.0)
+        since = np.clip((t - np.array(PUSHED)) / _PUSH_RISE, 0.0, 1.0)
         share = since * since * (3.0 - 2.0 * since)
         return np.asarray(self._push * (share[0] - share[1]))
 
@@ -347,13 +363,15 @@ def conveyor_run(
         sm.constraints.JointAccelerationLimits(),
     )
     clearance = sm.constraints.Clearance(
-        (sm.obstacles.Sphere("ball", ball, _BALL),), distance=_DISTANCE
+        (sm.obstacles.Sphere("ball", ball, _BALL_RADIUS),), distance=_BALL_CLEARANCE
     )
     replanner = realtime.Replanner(robot, task, constraints=(*limits, clearance), horizon=horizon)
     realtime.warm_up(replanner)
     arm = realtime.SimulatedArm(start, replanner.cycle, rng=seed)
     record = realtime.track(replanner, arm, Conveyor(robot, start, ball, seconds), seconds)
-    shown = sm.constraints.Clearance((sm.obstacles.Sphere("ball", ball, _BALL),), distance=0.0)
+    shown = sm.constraints.Clearance(
+        (sm.obstacles.Sphere("ball", ball, _BALL_RADIUS),), distance=0.0
+    )
     return replanner, record, record.as_plan(replanner, constraints=(limits[0], shown))
 
 

@@ -31,7 +31,11 @@ from selfmotion.shell.cli.app import (
 )
 from selfmotion.shop import controllers
 
-PROGRAM, PARTS = ".program", ".parts"
+# Suffix of a saved program.
+PROGRAM = ".program"
+# Suffix of saved parts of a motion.
+PARTS = ".parts"
+# End of the name of a timetable.
 TIMETABLE = ".timetable.csv"
 
 
@@ -102,7 +106,7 @@ def job(
                         work.robot, form, asked or sm.files.ProgramSettings()
                     )
         remarks = work.remarks
-    outputs.tell(remarks)
+    outputs.print_notes(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
@@ -127,14 +131,14 @@ def job(
     for target in wanted:
         unsound = outputs.left_out(program)
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
-            outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
+            outputs.print_left_out(target, terminal, unsound, quiet=as_json)
             continue
         of_stream = asked is not None and not asked.by_poses
         streamed = of_stream and has_targets and target.suffix.lower() == ".script"
         write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
-            outputs.tell_large(target, terminal)
+            outputs.print_large(target, terminal)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 
@@ -187,11 +191,11 @@ def finish_parts(
             )
     with StageDisplay(stages) as display:
         found = job.in_parts(progress=display.stage)
-    _show_parts(found, as_json, verbose, job.problem.remarks)
+    _show_parts(found, as_json, verbose, job.remarks)
     for file in wanted:
         unsound = outputs.left_out(found)
         if unsound and outputs.is_motion(file):
-            outputs.tell_left_out(file, terminal, unsound, quiet=as_json)
+            outputs.print_left_out(file, terminal, unsound, quiet=as_json)
             continue
         if file.suffix == PARTS:
             found.save(file)
@@ -203,7 +207,7 @@ def finish_parts(
             sm.files.write_motion(found, file)
         if not as_json:
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
-            outputs.tell_large(file, terminal)
+            outputs.print_large(file, terminal)
     raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 

@@ -131,7 +131,7 @@ def calibrate(
     outputs.check_suffixes(out or [])
     planned = sm.load_plan(file)
     problem = sm.calibrated(planned.problem, calibration)
-    checks.tell_difference(problem.robot, planned.trajectory)
+    checks.print_difference(problem.robot, planned.trajectory)
     judged = checks.on_calibrated(planned.problem, calibration)
     verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
     stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
@@ -233,7 +233,10 @@ def _plain(value: Any) -> Any:
 
 _Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
 _Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
-_PROBLEMS, _PAGES = (".toml", ".json"), (".html", ".png")
+# Suffixes of problem files.
+_PROBLEM_SUFFIXES = (".toml", ".json")
+# Suffixes of pages and pictures.
+_PAGE_SUFFIXES = (".html", ".png")
 
 
 @app.command(
@@ -292,7 +295,7 @@ def place(
             "--part and --path-alone say different things; give one of them"
         )
     for file in [*(out or []), *(drawn or [])]:
-        known = (*_PROBLEMS, ".npz") if file in (out or []) else _PAGES
+        known = (*_PROBLEM_SUFFIXES, ".npz") if file in (out or []) else _PAGE_SUFFIXES
         if file.suffix not in known:
             raise sm.errors.FileFormatError(
                 f"{file}: expected a name that ends in {', '.join(known)}"
@@ -389,10 +392,10 @@ def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
                 f"{file}: a job whose arm's base is moved is not written; set robot.base to the "
                 f"place that is found"
             )
-        if file.suffix not in _PROBLEMS or file.resolve().parent != job.resolve().parent:
+        if file.suffix not in _PROBLEM_SUFFIXES or file.resolve().parent != job.resolve().parent:
             raise sm.errors.FileFormatError(
-                f"{file}: expected a job file ({', '.join(_PROBLEMS)}) beside {job}, whose files "
-                f"it names"
+                f"{file}: expected a job file ({', '.join(_PROBLEM_SUFFIXES)}) beside {job}, whose "
+                f"files it names"
             )
 
 

@@ -69,7 +69,7 @@ def program_settings(
     return sm.files.ProgramSettings(**given) if given else None
 
 
-def tell_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
+def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
     """Print how the frame that a work object in numbers is counted in is turned from the root."""
     told = controllers.turned_base(robot)
     if told and asked is not None and isinstance(asked.work_object, SE3):
@@ -102,8 +102,10 @@ def _work_object(text: str) -> str | SE3:
 
 # The files that a plan is written to.
 
-# Text of more than so many bytes is better a bag.
-_TEXT, _LARGE = (".yaml", ".yml", ".json"), 10_000_000
+# Suffixes of messages that are written as text.
+_TEXT_SUFFIXES = (".yaml", ".yml", ".json")
+# Size of such a file above which a bag is advised [bytes].
+_LARGE_TEXT = 10_000_000
 
 
 def write(
@@ -129,7 +131,7 @@ def write(
     unsound = left_out(result)
     for file in [*out, *([] if html is None else [html])]:
         if unsound and is_motion(file):
-            tell_left_out(file, console, unsound, quiet=quiet)
+            print_left_out(file, console, unsound, quiet=quiet)
             continue
         try:
             _write_one(result, file, page=file is html)
@@ -140,14 +142,14 @@ def write(
         rescued = Path(tempfile.mkdtemp(prefix="selfmotion-")) / "plan.npz"
         result.save(rescued)
         written.append(rescued)
-    sound = _tell_written(result, written, console, quiet=quiet, whole=whole)
+    sound = _print_written(result, written, console, quiet=quiet, whole=whole)
     if faults:
         kept = next(file for file in written if file.suffix == ".npz")
         raise sm.errors.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
     return sound
 
 
-def _tell_written(
+def _print_written(
     result: sm.Plan, files: Sequence[Path], console: Console, *, quiet: bool, whole: bool
 ) -> bool:
     """Tell which files were written, and what motions in them are when they are read back."""
@@ -165,17 +167,17 @@ def _tell_written(
         if not quiet:
             text = f"wrote {file}{verdict and '; '}{verdict}"
             console.print(text, markup=False, soft_wrap=True)
-            tell_large(file, console)
+            print_large(file, console)
     if sampled and not quiet:
         rate = coarsest if messages == sampled else None
-        told = [reread.told_coarsest(coarsest)] if coarsest is not None else []
-        told.append(reread.told_straight(controllers.linear_miss(result, rate)))
+        told = [reread.coarsest_text(coarsest)] if coarsest is not None else []
+        told.append(reread.straight_text(controllers.linear_deviation(result, rate)))
         for text in told:
             console.print(text, markup=False, soft_wrap=True)
     return sound
 
 
-def tell(remarks: Sequence[str]) -> None:
+def print_notes(remarks: Sequence[str]) -> None:
     """Print what is to be known of a problem before it is planned."""
     for remark in remarks:
         stages.print(f"note: {remark}", markup=False, soft_wrap=True)
@@ -234,7 +236,7 @@ def left_out(made: sm.Plan | sm.Parts | sm.Program) -> str:
     return controllers.moving_ends(made) if verified else "it is not verified"
 
 
-def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
+def print_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
     """Say that a motion was not written, and why."""
     if not quiet:
         console.print(
@@ -244,9 +246,13 @@ def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> 
         )
 
 
-def tell_large(file: Path, console: Console, *, given_rate: bool = False) -> None:
+def print_large(file: Path, console: Console, *, given_rate: bool = False) -> None:
     """Say what is smaller than a large file of text; nothing where it is not large."""
-    if file.suffix.lower() in _TEXT and file.is_file() and file.stat().st_size > _LARGE:
+    if (
+        file.suffix.lower() in _TEXT_SUFFIXES
+        and file.is_file()
+        and file.stat().st_size > _LARGE_TEXT
+    ):
         fewer = "without --rate it has only those samples that the motion takes; " * given_rate
         console.print(
             f"{file} has {file.stat().st_size / 1e6:.0f} MB: {fewer}a ROS 2 bag takes about a "

@@ -1,4 +1,4 @@
-"""What is said of motions that were written: whether, read back, they are still the plan's."""
+"""Verification of written motions: whether, read back, they still satisfy the plan."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -62,14 +62,14 @@ def read_back(
             return read.verified and made.verified, f"read back: {read.verdict}"
         case sm.Program() | sm.Parts() if rate is not None:
             # Steps meet between its samples: there is no motion of each that rests at its ends.
-            return verified(made), _told_of_samples(made.trajectory, motion, rate)
+            return verified(made), _samples_text(made.trajectory, motion, rate)
         case sm.Program():
             found = controllers.judged_motion(motion, made)
             return found.verified, f"read back: {found.verdict}"
     return _judged_parts(made, motion, whole=whole)
 
 
-def _told_of_samples(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
+def _samples_text(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
     """Return how far a motion leaves the whole that it was sampled from, in words."""
     t = np.append(motion.t, motion.t[:-1] + 0.5 * np.diff(motion.t))
     off = read.of_joints(motion.joint_names)(np.clip(t, None, read.t[-1])) - motion(t)
@@ -93,23 +93,25 @@ def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tupl
             part = controllers.part_of(every, end, float(after))
             moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
     found = replace(made, plans=tuple(plans), moves=tuple(moves))
-    return found.verified, _told(found, whole)
+    return found.verified, _verdict_text(found, whole)
 
 
 def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
     read = controllers.read_program(target, made.robot)
-    count, stated, found = controllers.program_miss(made, target, read)
+    count, stated, found = controllers.program_deviation(made, target, read)
     told, kept = [], verified(made) and controllers.keeps_stated(found, stated)
-    for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
+    for deviation, said, where in zip(
+        found, stated, ("off the plan", "in free moves"), strict=True
+    ):
         # The file states nine digits.
-        kept &= all(one <= other + 1e-9 for one, other in zip(miss, said, strict=True))
-        if miss.position > 0.0:
+        kept &= all(one <= other + 1e-9 for one, other in zip(deviation, said, strict=True))
+        if deviation.position > 0.0:
             told.append(
-                f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
+                f"{1e3 * deviation.position:.3g} mm and {deviation.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = controllers.misswitched(read, made)
+    switched = controllers.switching_faults(read, made)
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
     remark, at_feeds = read.remark, read.within is not None
@@ -128,24 +130,24 @@ def verified(made: Made) -> bool:
 def judged(plan: sm.Plan, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
     """Return whether a motion is still that of a plan, and its verdict in words."""
     found = plan.problem.certify(motion, plan.tolerance, plan.report.ending)
-    return found.verified and not plan.altered, _told(found, whole)
+    return found.verified and not plan.altered, _verdict_text(found, whole)
 
 
-def _told(found: sm.Certificate | sm.Parts, whole: bool) -> str:
+def _verdict_text(found: sm.Certificate | sm.Parts, whole: bool) -> str:
     return f"read back: {found.verdict if whole else found.summary}"
 
 
-def told_straight(miss: controllers.LinearMiss) -> str:
+def straight_text(deviation: controllers.LinearDeviation) -> str:
     """Return what straight lines between samples cost, in words."""
-    rate = "no --rate keeps" if miss.rate is None else f"--rate {miss.rate:.0f} keeps"
+    rate = "no --rate keeps" if deviation.rate is None else f"--rate {deviation.rate:.0f} keeps"
     return (
-        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
-        f"{miss.rotation:.2g} rad of the motion; {rate} the plan's tolerance so (controllers of "
-        f"ROS 2 join by cubics or quintics, which are nearer)"
+        f"joined by straight lines, the samples stay within {deviation.position:.2g} m and "
+        f"{deviation.rotation:.2g} rad of the motion; {rate} the plan's tolerance so (controllers "
+        f"of ROS 2 join by cubics or quintics, which are nearer)"
     )
 
 
-def told_coarsest(rate: float) -> str:
+def coarsest_text(rate: float) -> str:
     """Return at which rate messages are, in words."""
     return (
         f"at {rate:g} Hz: the coarsest rate at which straight lines between samples keep the "

@@ -109,7 +109,7 @@ def batch(
             several.append([unread_item(file, error)])
             continue
         if has_outputs:
-            _told_apart(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
+            _print_note(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
     items = [item for each in several for item in each]
     names = [item.name for item in items]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -195,7 +195,7 @@ def track(
     raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
 
 
-def _told_apart(text: str) -> None:
+def _print_note(text: str) -> None:
     stages.print(text, markup=False, soft_wrap=True)
 
 
@@ -236,17 +236,17 @@ def follow(
     problem = sm.read_problem(file, allow_code=allow_code)
     left = [key for key in basics.read_document(file) if key in _OF_PLANS]
     if left:
-        _told_apart(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")
+        _print_note(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")
     asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}
     replanner = following.replanner_of(problem, **asked)
     # The arm goes as far as it can; better to know before it moves.
     if beyond := following.out_of_reach(problem):
-        _told_apart(f"note: {beyond}")
+        _print_note(f"note: {beyond}")
     with following.listening(listen) as port:
         # Nothing compiles once the arm moves.
         sm.warm_up(replanner)
         stages.print(f"waits for states at {listen}", markup=False)
-        link = following.Link(port, problem.path, replanner.limits, _told_apart, silence, seconds)
+        link = following.Link(port, problem.path, replanner.limits, _print_note, silence, seconds)
         try:
             realtime.follow(replanner, link.read, link.write, lead=latency)
         except KeyboardInterrupt:

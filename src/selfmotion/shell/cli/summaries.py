@@ -1,4 +1,4 @@
-"""What commands print unless everything is asked for, and what they print for programs."""
+"""Summaries of results: the short form for the terminal, and JSON for programs."""
 
 import dataclasses
 import re
@@ -18,7 +18,7 @@ from selfmotion.work.job import Program
 if TYPE_CHECKING:
     from selfmotion.work.batch import Batch
 
-# What messages of the library advise, in the words of the shell.
+# Advice in messages of the library → the same with options of the shell.
 
 # As the library says it → as the shell does, in this order.
 _WORDS = (
@@ -59,7 +59,7 @@ def in_shell(message: str) -> str:
     return message
 
 
-# What commands print unless everything is asked for: the verdict, one number, one remedy.
+# The short form of a result: the verdict, one number, one remedy.
 
 # What else a summary leaves out is said by this.
 _MORE = "--verbose"
@@ -90,10 +90,10 @@ def show_plan(plan: Plan, console: Console) -> None:
         ignores = ", which ignores the constraints" if share > 0.0 else ""
         change = f" ({100.0 * share:+.2g} % from the minimum-norm motion{ignores})"
     _print(console, f"cost {report.cost:.6g}{change}, {duration}")
-    if blocked := blocked_told(plan):
+    if blocked := blocked_text(plan):
         _print(console, blocked)
     if plan.metres:
-        _print(console, metres_told(plan))
+        _print(console, metres_text(plan))
     said = report.status in _ENDED_WELL and report.message == report.status.message
     if certificate.verified and not said:
         told = in_shell(report.message).removeprefix(f"{report.status.value}: ")
@@ -109,7 +109,7 @@ def show_plan(plan: Plan, console: Console) -> None:
             )
 
 
-def blocked_told(plan: Plan) -> str:
+def blocked_text(plan: Plan) -> str:
     """Return that bodies leave no motion that was found, and what may help; "" where they do not.
 
     Where it begins was free to choose.
@@ -130,7 +130,7 @@ def blocked_told(plan: Plan) -> str:
     )
 
 
-def metres_told(plan: Plan) -> str:
+def metres_text(plan: Plan) -> str:
     """Return what metres counted against radians, and how to have it otherwise."""
     counted = ", ".join(f"1 m of '{name}' as {rad:.3g} rad" for name, rad in plan.metres.items())
     names = plan.robot.joint_names
@@ -195,7 +195,7 @@ def _print(console: Console, text: str, style: str | None = None) -> None:
     console.print(text, style=style, markup=False, soft_wrap=not console.is_terminal)
 
 
-# What the commands print for programs.
+# Results as JSON.
 
 
 def batch_json(batch: "Batch") -> dict[str, Any]:

@@ -17,7 +17,7 @@ from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Comparison, Gap, Plan, Report
-from selfmotion.shell.cli.summaries import in_shell, metres_told
+from selfmotion.shell.cli.summaries import in_shell, metres_text
 from selfmotion.work.job import Program
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def show(plan: Plan, console: Console) -> None:
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
     console.print(f"joint reversals: {plan.reversals}", markup=False)
     if plan.metres:
-        console.print(metres_told(plan), markup=False, soft_wrap=not console.is_terminal)
+        console.print(metres_text(plan), markup=False, soft_wrap=not console.is_terminal)
 
 
 # A look at single poses, starts, and the proof: what more was tried is told.

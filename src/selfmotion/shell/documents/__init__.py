@@ -3,11 +3,13 @@
 from typing import Any
 
 from selfmotion.shell.documents.example import (
+    MAYBE as MAYBE,
     example_text as example_text,
     example_texts as example_texts,
 )
 from selfmotion.shell.documents.grid_items import grid_items as grid_items
 from selfmotion.shell.documents.joint_limits import (
+    joint_limit_notes as joint_limit_notes,
     read_joint_limits as read_joint_limits,
 )
 from selfmotion.shell.documents.overrides import (

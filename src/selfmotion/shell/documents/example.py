@@ -1,5 +1,6 @@
 """The problem files that ``selfmotion init`` writes."""
 
+import itertools
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,18 +10,29 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.model.collision import disabled_links, overlapping_by_design
+from selfmotion.model.collision import (
+    ALWAYS,
+    PERHAPS,
+    disabled_links,
+    overlapping_by_design,
+)
 from selfmotion.model.path import Circle, Line, Path
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task
 from selfmotion.problem.constraints import PositionDependentVelocityLimits
 
-# Where the arm of an example begins: where it has room for the example's paths.
+# Initial configurations of examples: those with room for the example's paths.
 
-# Configurations that are drawn; so many of them, least singular first, are moved along the paths.
-_DRAWN, _MOVED = 1000, 60
-# Poses of each path, Newton steps to each, and what may be left of it [m, rad].
-_POSES, _STEPS, _LEFT = 41, 4, 1e-6
+# Number of random configurations.
+_RANDOM_CONFIGURATIONS = 1000
+# Number of those, least singular first, that are moved along the paths.
+_MOVED_CONFIGURATIONS = 60
+# Number of poses of each path.
+_POSES = 41
+# Number of Newton steps to each pose.
+_NEWTON_STEPS = 4
+# Largest residual of a pose [m, rad].
+_RESIDUAL = 1e-6
 
 
 def roomy_starts(arm: RobotModel, task: Task, paths: Sequence[Path], count: int) -> list[Array]:
@@ -39,12 +51,12 @@ def roomy_starts(arm: RobotModel, task: Task, paths: Sequence[Path], count: int)
         So many at most.
     """
     lower, upper = arm.finite_limits()
-    share = np.random.default_rng(0).uniform(0.25, 0.75, (_DRAWN, arm.dof))
+    share = np.random.default_rng(0).uniform(0.25, 0.75, (_RANDOM_CONFIGURATIONS, arm.dof))
     drawn = lower + (upper - lower) * share
     least = np.array([_smallest(arm, task, q) for q in drawn])
     ways = [_positions(path) for path in paths]
     found = []
-    for k in np.argsort(-least)[:_MOVED]:
+    for k in np.argsort(-least)[:_MOVED_CONFIGURATIONS]:
         room = min(_room(arm, task, drawn[k], way) for way in ways)
         if room > 0.0:
             found.append((room, int(k)))
@@ -65,13 +77,13 @@ def _room(arm: RobotModel, task: Task, q: Array, way: Array) -> float:
     begin, least = arm.pose(q), np.inf
     for offset in way:
         goal = SE3(begin.rotation, begin.translation + offset)
-        for step in range(_STEPS + 1):
+        for step in range(_NEWTON_STEPS + 1):
             jacobian, rotation, position = arm.chain.at(q)
             error = task.twist_error(goal, SE3(rotation, position))
             rows = task.select(jacobian, rotation)
             left = task.select(error[:, None], rotation)[:, 0]
-            if step == _STEPS:
-                if np.abs(left).max() > _LEFT:
+            if step == _NEWTON_STEPS:
+                if np.abs(left).max() > _RESIDUAL:
                     return 0.0
                 break
             q = q + np.linalg.pinv(rows) @ left
@@ -243,10 +255,14 @@ _OF_ONE = """\
 # [grid]               # selfmotion batch {file}: all combinations
 # "path.duration" = [3, 4, 5]
 """
-# Radii of the circle [mm], and how many starts are tried with each.
-_RADII, _TRIES = (50, 20, 5), 3
-# How far from the arm the table stands, as a share of its reach, and seams from each other [m].
-_AWAY, _APART = 0.45, 0.05
+# Radii of the circle, tried in turn [mm].
+_RADII = (50, 20, 5)
+# Number of initial configurations that are tried with each radius.
+_STARTS = 3
+# Distance of the table from the arm, as a share of the arm's reach.
+_TABLE_DISTANCE = 0.45
+# Distance of the two seams of an example [m].
+_SEAM_DISTANCE = 0.05
 
 
 def example_text(robot: str | FilePath, file: str | FilePath, **options: Any) -> str:
@@ -313,7 +329,11 @@ def example_texts(
     task = Task.POINTING if positioner else _task_of(arm)
     where = _SEAMS if job else (_ON_PLATE if positioner else _PATH)
     whole = _HEAD + (_CELL if positioner else _ROBOT) + where + _REST + ("" if job else _OF_ONE)
-    apart = _clearance(arm, target, loaded, srdf, disabled, positioner) if clearance else _NONE
+    kept = [_NONE]
+    if clearance:
+        # Last, what may be made so as well, for the user to judge.
+        shares = (ALWAYS,) if named else (ALWAYS, PERHAPS)
+        kept = [_clearance(arm, target, loaded, srdf, disabled, positioner, x) for x in shares]
     given = _said_of_robot(robot, target, loaded, positioner) | {
         "tool": arm.tool,
         "curves": _CURVES if PositionDependentVelocityLimits().applies(arm) else "",
@@ -321,8 +341,7 @@ def example_texts(
         "file": target.name,
         "command": "job" if job else "plan",
         "task": task.value,
-        "away": _AWAY * arm.reach,
-        "clearance": apart,
+        "away": _TABLE_DISTANCE * arm.reach,
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))
@@ -331,7 +350,7 @@ def example_texts(
             f"{arm.name}: no configuration was found from which tool '{arm.tool}' follows a circle "
             f"of {_RADII[-1]} mm; take another link as --tool"
         )
-    for radius, q in starts:
+    for apart, (radius, q) in itertools.product(dict.fromkeys(kept), starts):
         usual = '"free"' if positioner else '"dexterous"'
         begin = usual if q is None else str(np.round(q, 4).tolist())
         also = "or numbers per joint, " if q is None else 'or "dexterous", '
@@ -339,9 +358,12 @@ def example_texts(
         at = arm.dexterous_configuration(_task_of(arm)) if q is None else np.round(q, 4)
         one, two = _places(arm, at, positioner)
         given |= {"one": one, "two": two, "begin": begin, "start": "" if job else start}
+        given["clearance"] = apart
         yield whole.format(**given, radius=radius)
 
 
+# What a file says of links that it leaves out and that only the user knows of.
+MAYBE = "are made so, or may be: see that they are"
 _NONE = "clearance = false      # leaves self-collision out"
 
 
@@ -352,11 +374,17 @@ def _clearance(
     srdf: str | FilePath | None,
     disabled: Sequence[Sequence[str]],
     in_cell: bool,
+    share: float,
 ) -> str:
-    """Return the lines of a file that say which links are kept apart."""
+    """Return the lines of a file that say which links are kept apart.
+
+    But for those that overlap in at least a `share` of all configurations.
+    """
     asked = [(one, other) for one, other in disabled]
     known = () if srdf is None else disabled_links(srdf, loaded["arguments"], loaded["packages"])
-    pairs = dict.fromkeys(asked, "as asked") | overlapping_by_design(arm, (*asked, *known))
+    pairs = dict.fromkeys(asked, "as asked") | overlapping_by_design(
+        arm, (*asked, *known), share=share
+    )
     if not pairs and srdf is None:
         return "# clearance = false    # leaves self-collision out"
     said = ["distance = 0"]
@@ -371,7 +399,8 @@ def _clearance(
         )
         said.append(f"disabled = [{listed}]")
         lines = [f"# {first} - {second}: {why}" for (first, second), why in pairs.items()]
-        lines.insert(0, "# Left out, as these links are made so:")
+        made_so = "are made so" if share == ALWAYS else MAYBE
+        lines.insert(0, f"# Left out, as these links {made_so}:")
     return "\n".join([*lines, f"clearance = {{ {', '.join(said)} }}    # false: none"])
 
 
@@ -416,10 +445,10 @@ def _starts(arm: RobotModel, task: Task, job: bool) -> Iterator[tuple[int, Array
     """Yield radii [mm] and configurations to begin in, the largest circles first."""
     begin = SE3.Identity()
     second = SE3(begin)
-    second.translation = np.array([0.0, _APART, 0.0])
+    second.translation = np.array([0.0, _SEAM_DISTANCE, 0.0])
     for radius in _RADII[:1] if job else _RADII:
         if job:
-            along = np.array([_APART, 0.0, 0.0])
+            along = np.array([_SEAM_DISTANCE, 0.0, 0.0])
             paths: list[Path] = []
             for first in (begin, second):
                 last = SE3(first)
@@ -428,7 +457,7 @@ def _starts(arm: RobotModel, task: Task, job: bool) -> Iterator[tuple[int, Array
             paths.append(Line(begin, second, 1.0))
         else:
             paths = [Circle.around(begin, 1e-3 * radius, 1.0)]
-        for q in roomy_starts(arm, task, paths, _TRIES):
+        for q in roomy_starts(arm, task, paths, _STARTS):
             yield radius, q
 
 
@@ -452,7 +481,7 @@ def _places(arm: RobotModel, q: Array, on_plate: bool) -> tuple[str, str]:
         return one, two
     first = arm.pose(q)
     second = SE3(first)
-    second.translation = first.translation + np.array([0.0, _APART, 0.0])
+    second.translation = first.translation + np.array([0.0, _SEAM_DISTANCE, 0.0])
     return _pose(first), _pose(second)
 
 

@@ -112,6 +112,25 @@ def read_joint_limits(
     return tuple(found)
 
 
+def joint_limit_notes(file: str | Path, robot: RobotModel) -> tuple[str, ...]:
+    """Return notes of what `read_joint_limits` takes for granted or passes over of a file."""
+    path = as_path(file)
+    document = _document(path)
+    notes = ["limits are taken for rad and s (m of joints that slide), as MoveIt's are"]
+    notes += [
+        f"{key} {document[key]:g} is applied, as MoveIt does where a request says none"
+        for key in _SCALINGS.values()
+        if document.get(key, 1.0) != 1.0
+    ]
+    others = [name for name in document[_JOINTS] if name not in robot.joint_names]
+    if others:
+        notes.append(f"left out, as the arm does not have them: {', '.join(map(str, others))}")
+    keys = {key for values in document[_JOINTS].values() for key in values} & set(_OTHERS)
+    if keys:
+        notes.append(f"passed over: {', '.join(sorted(keys))}")
+    return tuple(f"{path}: {note}" for note in notes)
+
+
 def _document(path: Path) -> Mapping[str, Any]:
     """Return the table of a file that has the joints' one in it."""
     document: Any = read_document(path)

@@ -1,4 +1,4 @@
-"""What a problem file may hold, as pydantic models made from the signatures of the classes.
+"""Schema of problem files: pydantic models made from the signatures of the classes.
 
 So a class is described once, in Python: its keys, defaults and first line of documentation are
 those of its parameters, and a class of one's own is known like ours.

@@ -22,7 +22,7 @@ from selfmotion.basics import (
     restore,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.model.collision import disabled_links
+from selfmotion.model.collision import disabled_links, srdf_notes
 from selfmotion.model.follow import Follow
 from selfmotion.model.motion import NullMotion
 from selfmotion.model.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_robot
@@ -32,7 +32,7 @@ from selfmotion.planning.planner import PlanRequest, Search
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import Cost, FunctionCost
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents.joint_limits import read_joint_limits
+from selfmotion.shell.documents.joint_limits import joint_limit_notes, read_joint_limits
 from selfmotion.shell.documents.problem_parts import (
     FUNCTION,
     name_kinds,
@@ -147,6 +147,8 @@ class _Reader:
     functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     degrees: str = ""
     memory: dict[str, Any] = field(default_factory=dict)
+    # What files that it names are taken to say.
+    notes: list[str] = field(default_factory=list)
 
     def job(self) -> PlanRequest:
         table, file = self.table, self.file
@@ -182,8 +184,9 @@ class _Reader:
         if "joint_limits" in table:
             with _named(file, "joint_limits"):
                 limits = read_joint_limits(self._beside(table["joint_limits"]), robot)
+                self.notes.extend(joint_limit_notes(self._beside(table["joint_limits"]), robot))
                 problem = replace(problem, constraints=(*problem.constraints, *limits))
-        return PlanRequest(problem, **self._settings())
+        return PlanRequest(problem, **self._settings(), notes=tuple(self.notes))
 
     def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
         # With all digits of poses, which their own text leaves out.
@@ -268,6 +271,7 @@ class _Reader:
             folders = [self._beside(name) for name in robot.get("packages", ())]
             srdf = self._beside(given.pop("srdf"))
             read = disabled_links(srdf, robot.get("arguments"), folders)
+            self.notes.extend(srdf_notes(srdf, robot.get("arguments"), folders))
             given["disabled"] = (*given.get("disabled", ()), *read)
         return Clearance(tuple(bodies), **given)
 

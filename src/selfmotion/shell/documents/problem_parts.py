@@ -1,4 +1,4 @@
-"""What tables of a problem file describe: own classes, motions, obstacles, starts, workpieces."""
+"""Objects from tables of a problem file: classes, motions, obstacles, starts, workpieces."""
 
 import importlib
 import sys
@@ -132,11 +132,11 @@ def _code(name: Any, where: str, folder: FilePath, allowed: bool) -> Any:
         ) from error
 
 
-# What the tables of a problem file describe: tool motions, obstacles, starts.
+# Tool motions, obstacles and starts from tables of a problem file.
 
 # Tool motions that may begin where the arm does, and have a feed.
 _SHAPES = ("circle", "line", "spiral")
-# What bounds a feed in tables of tool motions.
+# Keys of tables of tool motions that bound a feed.
 FEED_BOUNDS = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
 
 
@@ -166,13 +166,14 @@ def path_of(
     if bounds and feed is None:
         raise ProblemError(f"{next(iter(bounds))}: has no effect without a feed")
     if shape:
-        _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
+        _require_one({**values, "feed": feed} if feed else values, "duration", "feed")
         # At a feed, the shape's own pace does not matter.
         values.setdefault("duration", 1.0)
     match kind:
         case "file":
             del values["kind"]
             path: Path = read_path(beside(values.pop("file")), **values)
+            path = path if frame is not None else in_reference(path, robot)
         case "circle":
             path = _circle(values)
         case "line":
@@ -183,29 +184,36 @@ def path_of(
             inner = partial(path_of, robot=robot, start=start, beside=beside)
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
-    path = path if weave is None else woven(path, weave)
-    path = path if leads is None else led(path, leads)
+    path = path if weave is None else with_weave_table(path, weave)
+    path = path if leads is None else with_lead_table(path, leads)
     return path if frame is None else Placed(path, frame)
 
 
-def led(path: Path, values: Mapping[str, Any]) -> Path:
+def in_reference(path: Path, robot: RobotModel) -> Path:
+    """Return a path of a file with a note of the frame that its places are taken to be in."""
+    frame = f"'{robot.urdf.root}', the arm's root" if robot.reference is None else robot.reference
+    return path.noted((*path.notes, f"no frame is given: places of the file are in that of {frame}"
+                                    f" (else: frame, --frame)"))  # fmt: skip
+
+
+def with_lead_table(path: Path, values: Mapping[str, Any]) -> Path:
     """Return a path with a lead-in and a lead-out, as a file says it.
 
     An end at which a program has a rapid of its own along the tool's axis gets none.
     """
     _check_keys(values, "leads", ("length", "duration"), ("axis",))
     pieces = with_leads(path, **values).pieces
-    first, last = own_rapids(path)
+    first, last = rapid_ends(path)
     kept = pieces[int(first) : len(pieces) - int(last)]
-    told = (OWN_RAPIDS,) if first or last else ()
+    told = (RAPID_ENDS_NOTE,) if first or last else ()
     return Joined(kept).noted((*path.notes, *told))
 
 
 # The note on leads that a program does not need.
-OWN_RAPIDS = "leads are left out where the program has a rapid along the tool's axis"
+RAPID_ENDS_NOTE = "leads are left out where the program has a rapid along the tool's axis"
 
 
-def own_rapids(path: Path) -> tuple[bool, bool]:
+def rapid_ends(path: Path) -> tuple[bool, bool]:
     """Return whether a path begins, and whether it ends, with a rapid of a program."""
     pieces = path.pieces if isinstance(path, Joined) else (path,)
     first, last = pieces[0], pieces[-1]
@@ -215,7 +223,7 @@ def own_rapids(path: Path) -> tuple[bool, bool]:
     )
 
 
-def woven(path: Path, values: Mapping[str, Any]) -> Path:
+def with_weave_table(path: Path, values: Mapping[str, Any]) -> Path:
     """Return a path along which the tool swings, as a file says it."""
     _check_keys(values, "weave", ("amplitude", "pitch"), ("axis", "dwell"))
     return Weave(path, **values)
@@ -302,7 +310,7 @@ def _made(values: Mapping[str, Any]) -> Path:
 def _circle(values: dict[str, Any]) -> Path:
     del values["kind"]
     values.setdefault("normal", [0.0, 0.0, 1.0])
-    _exactly_one(values, "center", "radius")
+    _require_one(values, "center", "radius")
     start = values.pop("start")
     if "center" in values:
         return Circle(start, **values)
@@ -311,7 +319,7 @@ def _circle(values: dict[str, Any]) -> Path:
 
 def _line(values: dict[str, Any]) -> Path:
     del values["kind"]
-    _exactly_one(values, "end", "by")
+    _require_one(values, "end", "by")
     start: SE3 = values["start"]
     if "by" in values:
         by = np.asarray(values.pop("by"), dtype=np.float64)
@@ -322,7 +330,7 @@ def _line(values: dict[str, Any]) -> Path:
     return Line(**values)
 
 
-def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
+def _require_one(values: Mapping[str, Any], *names: str) -> None:
     given: Sequence[str] = [name for name in names if name in values]
     if len(given) != 1:
         found = " and ".join(given) or "neither"
@@ -331,7 +339,7 @@ def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
 
 # A workpiece in a file: a frame, and the paths and bodies that are placed with it.
 
-# What its mesh is called.
+# Name of its mesh.
 NAME = "workpiece"
 
 

@@ -169,7 +169,13 @@ def _parameters(source: Callable[..., Any]) -> dict[str, str]:
 _MOTION = "ToolMotion"
 # Paths that are made of others, and the key of these.
 _INNER = ("path", "pieces")
-_TEXT, _NUMBER, _FLAG = {"type": "string"}, {"type": "number"}, {"type": "boolean"}
+# JSON Schema of a text.
+_TEXT = {"type": "string"}
+# JSON Schema of a number.
+_NUMBER = {"type": "number"}
+# JSON Schema of a flag.
+_FLAG = {"type": "boolean"}
+# JSON Schema of a list of names.
 _NAMES = {"type": "array", "items": _TEXT}
 # What a seam says besides its problem, and a job besides its seams.
 _OF_SEAM: Mapping[str, Any] = {

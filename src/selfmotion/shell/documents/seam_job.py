@@ -28,13 +28,14 @@ from selfmotion.shell.documents.problem_file import job_of
 from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
-    led,
+    in_reference,
     obstacle,
-    own_rapids,
     placed_body,
+    rapid_ends,
     standing,
     start_of,
-    woven,
+    with_lead_table,
+    with_weave_table,
 )
 from selfmotion.shop.cam import (
     READING,
@@ -49,7 +50,8 @@ from selfmotion.work.job import FASTEST_FEED, Program, Seam, highest_feed, plan_
 
 # Keys of what seams share, of a job, of a seam besides those of a problem, of seams in one table.
 SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "clearance")
-MOVE_SECONDS, FORMER_SECONDS = "move_seconds", "deadline"
+MOVE_SECONDS = "move_seconds"
+FORMER_SECONDS = "deadline"
 JOB = ("start", "end", "order", "branches", "seconds_per_cost", MOVE_SECONDS, "rng")
 _RENAMED = (
     "job: 'deadline', seconds of the processor for each move, is called 'move_seconds' by now; "
@@ -62,14 +64,16 @@ _PACED = (
     *("feed", "duration", "jump", "corners", "tolerance", "corner_angle", "ramp"),
     *("flip_normals", "standoff", "along", "lead", "tilt", "lift", *READING, *FEED_BOUNDS),
 )
-# What a feed is called that is looked for, how fast it is at most, and where it counts.
-HIGHEST, _OF_FEED = "highest", ("most_feed", "run_up")
+# Value of `feed` that asks for the highest feed.
+HIGHEST = "highest"
+# Keys of a table of seams that are about its feed.
+_OF_FEED = ("most_feed", "run_up")
 OF_TABLE = (*_PLACED, *_PACED, *_OF_FEED)
 
 
 @dataclass(frozen=True, eq=False)
 class SeamJob:
-    """What a job file says: an arm, seams, and how to plan them.
+    """A job as its file states it: an arm, seams, and settings of the planner.
 
     Attributes
     ----------
@@ -84,7 +88,7 @@ class SeamJob:
     unjudged : tuple of str
         What nothing is asked of, as of files of machine tools; programs say it.
     notes : tuple of str
-        Of keys that are called otherwise by now.
+        Of keys that are called otherwise by now, and as of `PlanRequest`.
     """
 
     robot: RobotModel
@@ -97,7 +101,7 @@ class SeamJob:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: see `Problem.remarks`; of several seams the first's."""
+        """Notes before planning, see `Problem.remarks`; of alike ones that of the first seam."""
         found: dict[str, str] = {}
         for seam in self.seams:
             try:
@@ -216,7 +220,7 @@ def seam_job_of(
         tuple(seams),
         {**options, "constraints": kept},
         unjudged=(UNJUDGED,) if is_cut else (),
-        notes=(_RENAMED,) if FORMER_SECONDS in settings else (),
+        notes=(*whole.notes, *([_RENAMED] if FORMER_SECONDS in settings else [])),
     )
 
 
@@ -327,12 +331,12 @@ class _Reader:
             own = {**rest, "name": name}
             events = times_of_events(path, rows)
             if "weave" in values:
-                path = woven(path, values["weave"])
+                path = with_weave_table(path, values["weave"])
             if values.get("run_up"):
                 path, events = _run_up(path, events, f"seams, '{name}'", self._file)
             if "leads" in values:
                 events = _after_lead(events, values["leads"], path)
-                path = led(path, values["leads"])
+                path = with_lead_table(path, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
             if events or rows.one_way:
@@ -343,6 +347,8 @@ class _Reader:
             place = self._standing[0] if frame is None else self._standing[0] * frame
             if frame is not None or NAME in self._shared:
                 path = Placed(path, place)
+            else:
+                path = in_reference(path, self.first.problem.robot)
             found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
 
@@ -439,7 +445,7 @@ def _after_lead(
     events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None, path: Path | None
 ) -> list[tuple[str, float]]:
     """Return events of a path [s] after its lead-in, whose faults are told where it is made."""
-    has_own = path is not None and own_rapids(path)[0]
+    has_own = path is not None and rapid_ends(path)[0]
     first = 0.0 if has_own else (leads or {}).get("duration", 0.0)
     later = first if isinstance(first, int | float) else 0.0
     return [(event, later + at) for event, at in events]

@@ -32,12 +32,16 @@ _STEPS = 10
 _INTERVALS = 8
 
 
-# Nodes by which derivatives are found, of which orders, and where.
-_NODES, _ORDERS = 13, 4
+# Number of nodes of a polynomial fit whose derivatives are compared.
+_NODES = 13
+# Highest order of derivatives.
+_ORDERS = 4
+# Sample points of each interval, on [-1, 1].
 _PLACES = np.linspace(-1.0, 1.0, 41)
-# What rounding leaves of derivatives: as a share of the series; and so many of the last digits of
-# values are wrong, which derivatives make much larger.
-_ROUNDING, _DIGITS = 1e-6, 32.0
+# Rounding error of derivatives, as a share of the series.
+_ROUNDING = 1e-6
+# Rounding error of values in units of the last place, which derivatives amplify.
+_DIGITS = 32.0
 
 
 def check_majorants(

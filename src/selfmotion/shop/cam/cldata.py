@@ -182,6 +182,7 @@ class _Reader:
                 self._ahead = self._axes @ self._numbers(word, given, 3)
             case "TLAXIS":
                 self._axis = self._direction(self._numbers(word, given, 3).tolist())
+                machine.says_axis = True
             case "RAPID" if not rest:
                 self._rapid = True
             case "FEDRAT":
@@ -245,7 +246,7 @@ class _Reader:
             )
         self.machine.note(f"INSERT {text[:40]}: lines for a control are passed over")
 
-    def _place(self, values: Sequence[float]) -> Array:
+    def _position(self, values: Sequence[float]) -> Array:
         """Return a place (3,) [m] of the file in its first frame."""
         found: Array = self._origin + self._axes @ (self._unit * np.array(values))
         return found
@@ -307,14 +308,14 @@ class _Reader:
         values = [self._number(text) for text in given]
         if len(values) not in (3, 6) or (word == "GODLTA" and len(values) != 3):
             raise machine.fault(f"{word} has {len(values)} numbers, expected x,y,z or x,y,z,i,j,k")
-        position = self._place(values[:3])
+        position = self._position(values[:3])
         if word == "GODLTA":
             if np.isnan(machine.position).any():
                 raise machine.fault("GODLTA goes on from a place that is not known yet")
             position = position - self._origin + machine.position
         axis = machine.axis if self._axis is None else self._axis
         if len(values) == 6:
-            axis = self._direction(values[3:])
+            axis, machine.says_axis = self._direction(values[3:]), True
         travels = word in ("FROM", "GOHOME")
         if self._cycle and not travels:
             self._drill(position, axis)
@@ -426,7 +427,7 @@ class _Reader:
             raise self.machine.fault(f"{word} goes round {turns:g} times, expected up to {_TURNS}")
         axis = self._direction(values[3:6])
         more_turns = int(np.ceil(turns - 1e-6)) - 1
-        return _Arc(self._place(values[:3]), -axis if is_left else axis, more_turns)
+        return _Arc(self._position(values[:3]), -axis if is_left else axis, more_turns)
 
     def _go_round(self, text: str) -> None:
         """Go along an arc as CATIA writes it: ``INDIRV/…`` and ``TLON,GOFWD/ (CIRCLE/ …``."""
@@ -440,7 +441,7 @@ class _Reader:
         last = [self._number(item.strip()) for item in ends[-1][1].split(",")]
         if len(values) != (4 if body[1] == "CIRCLE" else 7) or len(last) not in (3, 6):
             raise machine.fault(f"'{text[:60]}': expected a centre, a radius and where it ends")
-        center, goal = self._place(values[:3]), self._place(last[-3:])
+        center, goal = self._position(values[:3]), self._position(last[-3:])
         axis = self._direction(_UP.tolist() if body[1] == "CIRCLE" else values[3:6])
         # The side that it begins to.
         forward = float(np.cross(machine.position - center, ahead) @ axis)

@@ -12,11 +12,11 @@ from selfmotion.model.path import from_normal
 from selfmotion.shop.cam.path_rows import PoseRows
 
 # Largest size of a file [bytes].
-_BYTES = 200_000_000
+_MAX_FILE_SIZE = 200_000_000
 # Largest number of poses of a cut.
-_POSES = 1_000_000
+_MAX_POSES = 1_000_000
 # Largest distance of a place from zero [m].
-_FAR = 1e3
+_MAX_COORDINATE = 1e3
 # Event where a printer draws filament back.
 RETRACT = "retract"
 # Event where a printer pushes it forward again.
@@ -24,22 +24,27 @@ PRIME = "prime"
 # Events that stop something: after a cut they belong to that.
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 # The suffix of programs of Siemens' controls.
-_SIEMENS = ".mpf"
+_SIEMENS_SUFFIX = ".mpf"
 # Remark on what no program of a machine tool states.
 UNJUDGED = "stock and engagement are not judged"
-_FREE = (
+# Note on a file that does not say how the tool stands.
+UPRIGHT_NOTE = (
+    "nothing says how the tool stands: its z axis points down, against that of the file, and "
+    "places are those of its tip"
+)
+_FREE_MOTION_NOTE = (
     "only rapids along the tool's axis are made as the file has them, all others are free motions; "
     "let CAM write retracts and approaches along the axis"
 )
 _UP = np.array([0.0, 0.0, 1.0])
 # Difference of positions and axes of poses that are the same [m].
-_SAME = 1e-9
+_SAME_POSE = 1e-9
 # Largest speed of a rapid that is part of a cut [m/s].
 RAPID = 0.1
 # Largest distance from the tool's axis of a rapid along it, by rounding of files [m].
-_ASIDE = 2e-5
+_LATERAL_TOLERANCE = 2e-5
 # The same as a share of its length.
-_SKEW = 1e-3
+_TILT_TOLERANCE = 1e-3
 # Difference from -1 of the cosine between axes of which no rotation is the shortest.
 _OPPOSITE = 1e-9
 
@@ -52,7 +57,7 @@ class Cut:
 
     Attributes
     ----------
-    places : list of str
+    labels : list of str
     positions, axes : list of (3,)
         Of the tip [m], and from the tip to the holder.
     feeds : list of float
@@ -65,7 +70,7 @@ class Cut:
         Whether it is a hole that is done: what is cut next is no part of it.
     """
 
-    places: list[str] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
     positions: list[Array] = field(default_factory=list)
     axes: list[Array] = field(default_factory=list)
     feeds: list[float] = field(default_factory=list)
@@ -79,14 +84,14 @@ class Cut:
         return not all(self.rapid[1:])
 
     def add(
-        self, place: str, position: Array, axis: Array, feed: float, *, rapid: bool = False
+        self, label: str, position: Array, axis: Array, feed: float, *, rapid: bool = False
     ) -> None:
         """Add a pose, unless it is the last one again."""
         if self.positions:
             away = np.abs(position - self.positions[-1]).max(), np.abs(axis - self.axes[-1]).max()
-            if max(away) < _SAME:
+            if max(away) < _SAME_POSE:
                 return
-        self.places.append(place)
+        self.labels.append(label)
         self.positions.append(position)
         self.axes.append(axis)
         self.feeds.append(feed)
@@ -94,7 +99,7 @@ class Cut:
 
     def ends(self, event: str) -> None:
         """Note what happens at its end."""
-        self.events.append((len(self.places) - 1, event))
+        self.events.append((len(self.labels) - 1, event))
 
     def rows(self) -> PoseRows:
         """Return the poses, the tool's z axis against the axes, turned as little as possible."""
@@ -103,7 +108,7 @@ class Cut:
         rapid = np.array([*self.rapid[1:], self.rapid[-1]])
         rotations = _transported(-np.array(self.axes))
         return PoseRows(
-            self.places,
+            self.labels,
             np.array(self.positions),
             "rotation",
             rotations,
@@ -141,7 +146,7 @@ def _transported(axes: Array) -> Array:
 
 
 class Machine:
-    """Where the tool is, and the cuts so far.
+    """State of a machine tool while its program is read, with the cuts so far.
 
     Parameters
     ----------
@@ -156,6 +161,8 @@ class Machine:
         self.feed = 0.0
         self.cuts: list[Cut] = []
         self.notes: list[str] = []
+        # Whether the file says how the tool stands.
+        self.says_axis = False
         # The cut that is read, or the rapids that lead to one; what happens before the next.
         self._open: Cut | None = None
         self._next: list[str] = []
@@ -180,7 +187,7 @@ class Machine:
             "of what only Siemens' controls know, TRAORI, TRAFOOF, X=… and A3= B3= C3= are read: "
             "let CAM write ISO G-code for the rest, or APT; "
         )
-        siemens = own if self.file.suffix.lower() == _SIEMENS else ""
+        siemens = own if self.file.suffix.lower() == _SIEMENS_SUFFIX else ""
         return self.fault(
             f"{what} is not read: {siemens}page 'Files' of the docs lists what is (read_path)"
         )
@@ -209,9 +216,9 @@ class Machine:
             raise FileFormatError(
                 f"{self.file}: cannot be read: {error.strerror or error}"
             ) from error
-        if len(content) > _BYTES:
+        if len(content) > _MAX_FILE_SIZE:
             raise FileFormatError(
-                f"{self.file}: has {len(content)} bytes, expected {_BYTES} at most"
+                f"{self.file}: has {len(content)} bytes, expected {_MAX_FILE_SIZE} at most"
             )
         # DOS marks the end of a file.
         return text_of(self.file, content).rstrip("\x1a")
@@ -222,7 +229,7 @@ class Machine:
         known = not np.isnan(position).any()
         if self._open is not None and known and self._is_along(position, axis):
             self.release()
-            self._open.add(self._place, position, axis, RAPID, rapid=True)
+            self._open.add(self._label, position, axis, RAPID, rapid=True)
         else:
             self._leaves(position)
             if known:
@@ -230,8 +237,8 @@ class Machine:
                 if self._above > self._height(position, axis):
                     # It comes down from where it went up to.
                     above = position + (self._above - self._height(position, axis)) * axis
-                    self._open.add(self._place, above, axis, RAPID, rapid=True)
-                self._open.add(self._place, position, axis, RAPID, rapid=True)
+                    self._open.add(self._label, above, axis, RAPID, rapid=True)
+                self._open.add(self._label, position, axis, RAPID, rapid=True)
                 self._above = -np.inf
         self._is_at(position, axis)
 
@@ -250,7 +257,7 @@ class Machine:
 
     def _height(self, position: Array, axis: Array) -> float:
         """Return the height of a place [m]; infinite where it is not known or the tool tilted."""
-        is_up = float(np.abs(axis - _UP).max()) < _SAME
+        is_up = float(np.abs(axis - _UP).max()) < _SAME_POSE
         return float(position @ _UP) if is_up and not np.isnan(position).any() else np.inf
 
     def _is_along(self, position: Array, axis: Array) -> bool:
@@ -258,8 +265,8 @@ class Machine:
         step = position - self.position
         length = float(np.linalg.norm(step))
         aside = float(np.linalg.norm(step - (step @ axis) * axis))
-        is_turned = np.abs(axis - self.axis).max() > _SKEW
-        return not is_turned and aside <= _ASIDE + _SKEW * length
+        is_turned = np.abs(axis - self.axis).max() > _TILT_TOLERANCE
+        return not is_turned and aside <= _LATERAL_TOLERANCE + _TILT_TOLERANCE * length
 
     def _leaves(self, position: Array) -> None:
         """End a cut."""
@@ -270,13 +277,15 @@ class Machine:
         if not np.isnan(position).any():
             step = position - left.positions[-1]
             away = float(step @ left.axes[-1])
-            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(step))
+            self._slanted = abs(away) > _LATERAL_TOLERANCE + _TILT_TOLERANCE * float(
+                np.linalg.norm(step)
+            )
         if not left.cuts:
             # It went nowhere, but what happened there did.
             self.cuts = [cut for cut in self.cuts if cut is not left]
             self._next = [*(event for _, event in left.events), *self._next]
         elif self._slanted and left.rapid[-1] is False:
-            self.note(f"a rapid leaves a cut aside: {_FREE}")
+            self.note(f"a rapid leaves a cut aside: {_FREE_MOTION_NOTE}")
 
     def cut(self, position: Array, axis: Array) -> None:
         """Go somewhere at the feed."""
@@ -291,16 +300,16 @@ class Machine:
             self._leaves(np.full(3, np.nan))
             self._open = Cut()
             if known:
-                self._open.add(self._place, self.position, self.axis, RAPID, rapid=True)
+                self._open.add(self._label, self.position, self.axis, RAPID, rapid=True)
         if not self.cuts or self.cuts[-1] is not self._open:
             self.cuts.append(self._open)
             self._open.events[:0] = [(0, event) for event in self._next]
             self._next = []
-            if self._slanted and len(self._open.places) == 1:
-                self.note(f"a rapid comes to a cut aside: {_FREE}")
-        self._open.add(self._place, position, axis, self.feed)
-        if len(self._open.places) > _POSES:
-            raise self.fault(f"a cut has more than {_POSES} poses")
+            if self._slanted and len(self._open.labels) == 1:
+                self.note(f"a rapid comes to a cut aside: {_FREE_MOTION_NOTE}")
+        self._open.add(self._label, position, axis, self.feed)
+        if len(self._open.labels) > _MAX_POSES:
+            raise self.fault(f"a cut has more than {_MAX_POSES} poses")
         self._is_at(position, axis)
 
     def ends_hole(self) -> None:
@@ -326,13 +335,13 @@ class Machine:
         if self._held is not None:
             self._held.append(event)
             return
-        is_between = self._open is None or len(self._open.places) == 1
+        is_between = self._open is None or len(self._open.labels) == 1
         if is_between and event in STOPS and self.cuts and not self._waiting:
             self.cuts[-1].ends(event)
         elif self._open is None:
             self._next.append(event)
         else:
-            self._open.events.append((len(self._open.places) - 1, event))
+            self._open.events.append((len(self._open.labels) - 1, event))
 
     @property
     def _waiting(self) -> bool:
@@ -340,11 +349,11 @@ class Machine:
         return bool(self._next or (self._open and self._open.events))
 
     @property
-    def _place(self) -> str:
+    def _label(self) -> str:
         return f"line {self.number}"
 
     def _check(self, position: Array) -> None:
-        if np.nanmax(np.abs(position), initial=0.0) > _FAR:
+        if np.nanmax(np.abs(position), initial=0.0) > _MAX_COORDINATE:
             raise self.fault(f"{position.tolist()} m is farther than anything is")
 
     def seams(self) -> Mapping[str, PoseRows]:
@@ -356,7 +365,8 @@ class Machine:
         self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
-        notes = (*self.notes, UNJUDGED)
+        unsaid = () if self.says_axis else (UPRIGHT_NOTE,)
+        notes = (*self.notes, *unsaid, UNJUDGED)
         rows = (replace(cut.rows(), one_way=True, notes=notes) for cut in moved)
         return {f"cut {number}": each for number, each in enumerate(rows, 1)}
 
@@ -373,14 +383,14 @@ def unit_axis(values: Sequence[float], machine: Machine) -> Array:
 # Arcs of machines as points: circles about an axis, and helices along it.
 
 # Largest deviation of chords from their arc [m].
-_CHORD = 1e-5
+_CHORD_TOLERANCE = 1e-5
 # Difference of the distances of an arc's ends from its centre, and by which ends may be farther
 # apart than the circle is wide [m].
-_ROUND = 2e-4
+_RADIUS_TOLERANCE = 2e-4
 # Largest radius of an arc that is no fault of what wrote it [m].
-_LARGEST = 1e5
+_MAX_RADIUS = 1e5
 # Largest number of chords of an arc.
-_POINTS = 100_000
+_MAX_POINTS = 100_000
 
 
 def arc_points(
@@ -412,12 +422,12 @@ def arc_points(
     heights = (start - center) @ axis, (goal - center) @ axis
     arms = start - center - heights[0] * axis, goal - center - heights[1] * axis
     radius, other = (float(np.linalg.norm(arm)) for arm in arms)
-    if radius < _SAME or abs(radius - other) > _ROUND:
+    if radius < _SAME_POSE or abs(radius - other) > _RADIUS_TOLERANCE:
         raise machine.fault(
             f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
             f"{1e3 * other:.4g} mm from it"
         )
-    if radius > _LARGEST:
+    if radius > _MAX_RADIUS:
         raise machine.fault(f"the arc has a radius of {radius:.4g} m")
     x = arms[0] / radius
     y = np.cross(axis, x)
@@ -425,9 +435,11 @@ def arc_points(
     if turn < 1e-9:
         turn = 2.0 * np.pi
     turn += 2.0 * np.pi * more_turns
-    count = max(2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD / radius))))))
-    if count > _POINTS:
-        raise machine.fault(f"the arc takes {count} chords, expected {_POINTS} at most")
+    count = max(
+        2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD_TOLERANCE / radius)))))
+    )
+    if count > _MAX_POINTS:
+        raise machine.fault(f"the arc takes {count} chords, expected {_MAX_POINTS} at most")
     share = np.arange(1, count + 1)[:, None] / count
     angle, radii = turn * share, radius + (other - radius) * share
     found = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
@@ -458,7 +470,7 @@ def center_by_radius(
     """
     chord = goal - start
     length = float(np.linalg.norm(chord))
-    if length < _SAME or length > 2.0 * abs(radius) + _ROUND:
+    if length < _SAME_POSE or length > 2.0 * abs(radius) + _RADIUS_TOLERANCE:
         raise machine.fault(
             f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
         )
@@ -473,11 +485,11 @@ def center_by_radius(
 # Distance of the tool from the bottom of a hole that is there already, or comes back to break
 # chips [m].
 _OFF = 5e-4
-_PECKS = 10_000
+_MAX_PECKS = 10_000
 
 
 class Pecks(NamedTuple):
-    """How a deep hole is drilled: so far at once [m], and out in between, or only a little back."""
+    """Peck cycle of a deep hole: depth of a peck [m], and full or partial retraction between."""
 
     first: float
     others: float
@@ -544,12 +556,12 @@ def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
     """Return how deep it is after each peck."""
     if pecks is None:
         return [depth]
-    if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _PECKS:
+    if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _MAX_PECKS:
         raise machine.fault(
             f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
         )
     found, here = list[float](), pecks.first
-    while here < depth - _SAME:
+    while here < depth - _SAME_POSE:
         found.append(here)
         here += pecks.others
     return [*found, depth]

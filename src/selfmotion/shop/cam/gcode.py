@@ -37,15 +37,15 @@ _INCH = 25.4e-3
 # Millimetre [m].
 _MM = 1e-3
 # Distance of places that are the same [m].
-_SAME = 1e-9
+_SAME_AXIS = 1e-9
 # Largest number of turns of a helix.
-_TURNS = 1000
+_MAX_TURNS = 1000
 # Words that change nothing here: cutter compensation off, tool length (programs say where the tip
 # is), no polar words, mirror or turn, how corners are smoothed.
-_NOTHING = {"G40", "G43", "G69", "G64", "G61", "G61.1", "G5.1", "G8", "G9"}
-_NOTHING |= {"G15", "G50.1", "G67"}
+_IGNORED = {"G40", "G43", "G69", "G64", "G61", "G61.1", "G5.1", "G8", "G9"}
+_IGNORED |= {"G15", "G50.1", "G67"}
 # Words that are not read → the reason, with what to do.
-_REASONS = {
+_REFUSED = {
     **dict.fromkeys(("G41", "G42"), "the cutter's radius is not added: let CAM do so"),
     "G95": "feeds by turns of a spindle are not read: let CAM write them by the minute (G94)",
     "G96": "speeds of a lathe are not read",
@@ -59,23 +59,23 @@ _REASONS = {
     ),
 }
 # A wait, a retraction of its own, a look at a bed.
-_STANDING = {"G4", "G10", "G11", "G29"}
+_NON_MOTION = {"G4", "G10", "G11", "G29"}
 # Words that have P and Q, besides cycles, arcs and M words: how corners are smoothed.
 _WITH_P = {"G61", "G61.1", "G64", "G5.1", "G8"}
 # Calls of other programs.
-_CALLS = {"M96", "M97", "M98", "M99", "M198"}
+_SUBPROGRAM_CALLS = {"M96", "M97", "M98", "M99", "M198"}
 # Zeros of workpieces; a program has one.
-_ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
-_TIP = {"G43.4", "G43.5"}
+_WORK_OFFSETS = {"G54", "G55", "G56", "G57", "G58", "G59"}
+_TIP_CONTROL = {"G43.4", "G43.5"}
 # The axes of arcs' planes and their normal, right-handed; what goes to a place of the machine.
 _PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 # Cycles: those that drill along Z, and those that need a spindle that is synchronous or stops.
 _DRILLS = {"G73", "G81", "G82", "G83", "G85", "G89"}
 _CYCLES = {"G74", "G76", "G84", "G86", "G87", "G88"}
-_HOME = {"G28", "G30", "G53"}
+_MACHINE_POSITIONS = {"G28", "G30", "G53"}
 # Words of printers that are read; all others are commands of its own.
-_MOVES = re.compile(r"[GTXYZEF]\s*[0-9+.-]")
-_NUMBERED = re.compile(r"N\s*[0-9]+\s*")
+_MOTION_WORD = re.compile(r"[GTXYZEF]\s*[0-9+.-]")
+_LINE_NUMBER = re.compile(r"N\s*[0-9]+\s*")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
 _ENDS = {"M2", "M30"}
 # Of each group a line says one: controls refuse two (Grbl's error 21, LinuxCNC), and which one
@@ -84,7 +84,7 @@ _GROUPS: tuple[Collection[str], ...] = (
     _MOTIONS,
     _DRILLS,
     _PLANES,
-    _ZEROS,
+    _WORK_OFFSETS,
     ("G20", "G21"),
     ("G90", "G91"),
     ("G90.1", "G91.1"),
@@ -93,6 +93,16 @@ _GROUPS: tuple[Collection[str], ...] = (
     ("M82", "M83"),
 )
 _AXES = "XYZABC"
+# Modes that no line may say: the words that would, what has to be in the program for the mode to
+# count, and what is taken.
+_DEFAULTS = (
+    (("G20", "G21"), "", "lengths are taken for mm"),
+    (("G90", "G91"), "", "places are taken for absolute ones"),
+    (("G93", "G94"), "feed", "F is taken for a length by the minute"),
+    (("G17", "G18", "G19"), "arc", "arcs are taken to lie in the plane of X and Y"),
+    (("G98", "G99"), "hole", "holes are left as high as where they were come to"),
+    (("M82", "M83"), "material", "E is taken to count from the start"),
+)
 
 
 def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, PoseRows]:
@@ -111,7 +121,7 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
         reader.stay_flat()
     for number, line in enumerate(lines_of(text), 1):
         reader.machine.number = number
-        if reader.take(line):
+        if reader.read_line(line):
             break
     return reader.seams()
 
@@ -137,15 +147,22 @@ class _Reader:
         self._hole: dict[str, float] = {}
         # How far material is fed, and whether words say so from the start.
         self._fed, self._fed_from_start = 0.0, True
-        # What S said on the line of a cut; the first tool; whether a unit is said.
+        # What S said on the line of a cut; the first tool.
         self._power: float | None = None
         self._tool: float | None = None
-        self._says_unit = False
+        # The words G and M of all lines, and what the program has of that a mode counts for.
+        self._said: set[str] = set()
+        self._has: set[str] = {""}
 
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts by names."""
-        if not (self._says_unit or self._prints):
-            self.machine.notes.append("no line says G20 or G21: lengths are taken for mm")
+        unsaid = [
+            f"{', '.join(words[:-1])} or {words[-1]}: {taken}"
+            for words, of, taken in _DEFAULTS
+            if of in self._has and self._said.isdisjoint(words)
+        ]
+        if unsaid:
+            self.machine.notes.append(f"no line says {'; '.join(unsaid)}")
         return self.machine.seams()
 
     def stay_flat(self) -> None:
@@ -153,13 +170,13 @@ class _Reader:
         self._at[2] = 0.0
         self.machine.notes.append("no line says Z: it is taken for 0")
 
-    def take(self, line: str) -> bool:
+    def read_line(self, line: str) -> bool:
         """Take a line; return whether the program ends with it."""
         machine = self.machine
         text = bare_line(line, machine)
         if self._prints and text:
-            bare = _NUMBERED.sub("", text, count=1) if text.startswith("N") else text
-            if not _MOVES.match(bare):
+            bare = _LINE_NUMBER.sub("", text, count=1) if text.startswith("N") else text
+            if not _MOTION_WORD.match(bare):
                 self._command(bare)
                 return False
         if text == "%":
@@ -170,12 +187,13 @@ class _Reader:
             return False
         words = words_of(text, machine)
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
+        self._said.update(codes)
         for group in _GROUPS:
             said = [code for code in codes if code in group]
             if len(said) > 1:
                 raise machine.fault(f"{said[0]} and {said[1]} are in one line")
-        if not _STANDING.isdisjoint(codes):
-            self._stand(words, codes)
+        if not _NON_MOTION.isdisjoint(codes):
+            self._read_non_motion(words, codes)
             return not _ENDS.isdisjoint(codes)
         values = values_of(words, machine)
         modes = ("M82", "M83")
@@ -195,16 +213,16 @@ class _Reader:
         # What starts does so before the motion of its line, what stops after it; where a rapid
         # leaves the cut before, what starts belongs to the next one.
         late = [code for code in switched if code in STOPS]
-        if self._travels:
+        if self._is_rapid:
             machine.hold()
         for code in switched:
             if code not in late:
                 self._mode(code)
-        home = next((code for code in codes if code in _HOME), None)
+        home = next((code for code in codes if code in _MACHINE_POSITIONS), None)
         if home is not None:
-            self._goes_home(home, values)
+            self._move_to_machine_position(home, values)
         elif "G92" in codes:
-            self._set(values)
+            self._set_position(values)
         elif self._cycle:
             self._drill(values)
         else:
@@ -228,15 +246,17 @@ class _Reader:
         listens = any(code in _WITH_P or code.startswith("M") for code in codes)
         return bool(self._cycle) or is_arc or listens
 
-    def _stand(self, words: Sequence[tuple[str, str]], codes: Sequence[str]) -> None:
+    def _read_non_motion(self, words: Sequence[tuple[str, str]], codes: Sequence[str]) -> None:
         """Take a line in which nothing moves; its modes hold from then on."""
         machine = self.machine
-        name, *others = [code for code in codes if code in _STANDING]
+        name, *others = [code for code in codes if code in _NON_MOTION]
         said = [(letter, value) for letter, value in words if letter not in "GMN"]
         letters = {letter for letter, _ in said}
         if others:
             raise machine.fault(f"{name} and {others[0]} are in one line")
-        goes = any(code in _MOTIONS or code in _HOME or code == "G92" for code in codes)
+        goes = any(
+            code in _MOTIONS or code in _MACHINE_POSITIONS or code == "G92" for code in codes
+        )
         if name == "G4":
             moved = letters - set("PXUSF") if len(letters) < 2 else letters - set("P")
             if moved or goes:
@@ -268,7 +288,7 @@ class _Reader:
     def _mode(self, code: str) -> None:
         match code:
             case "G20" | "G21":
-                self._unit, self._says_unit = _INCH if code == "G20" else _MM, True
+                self._unit = _INCH if code == "G20" else _MM
             case "G90" | "G91":
                 self._absolute = code == "G90"
             case "G93" | "G94":
@@ -280,8 +300,8 @@ class _Reader:
                 self._tip = False
             case "G90.1" | "G91.1":
                 self._centers_absolute = code == "G90.1"
-            case _ if code in _REASONS:
-                raise self.machine.fault(f"{code}: {_REASONS[code]}")
+            case _ if code in _REFUSED:
+                raise self.machine.fault(f"{code}: {_REFUSED[code]}")
             case _ if code in _PLANES:
                 self._plane = _PLANES[code]
             case _ if code in _MOTIONS:
@@ -294,16 +314,18 @@ class _Reader:
                 self._returns = code == "G98"
             case "G80":
                 self._cycle = ""
-            case _ if code in _TIP:
+            case _ if code in _TIP_CONTROL:
                 self._tip = True
-            case _ if code in _ZEROS:
+            case _ if code in _WORK_OFFSETS:
                 self._zero = self._zero or code
                 if code != self._zero:
                     raise self.machine.fault(
                         f"{code} after {self._zero}: where their zeros are to each other is not "
                         f"known; write one program for each"
                     )
-            case _ if code in _NOTHING or code in _ENDS or code in _HOME or code == "G92":
+            case _ if (
+                code in _IGNORED or code in _ENDS or code in _MACHINE_POSITIONS or code == "G92"
+            ):
                 pass
             case "M82" | "M83" if self._prints:
                 self._fed_from_start = code == "M82"
@@ -312,7 +334,7 @@ class _Reader:
                     f"{code}: cycles that tap or bore are not read, those that drill are "
                     f"({', '.join(sorted(_DRILLS))}); let CAM write their moves (G0, G1)"
                 )
-            case _ if code in _CALLS:
+            case _ if code in _SUBPROGRAM_CALLS:
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
                 self.machine.happens(code)
@@ -322,14 +344,15 @@ class _Reader:
     def _command(self, text: str) -> None:
         """Take a line of a printer that moves nothing: it happens where the tool is."""
         code = (text.split() or [""])[0]
-        if code in _REASONS:
-            raise self.machine.fault(f"{code}: {_REASONS[code]}")
+        if code in _REFUSED:
+            raise self.machine.fault(f"{code}: {_REFUSED[code]}")
         if code in ("M82", "M83"):
+            self._said.add(code)
             self._fed_from_start = code == "M82"
         elif code not in ("", "%"):
             self.machine.happens(code)
 
-    def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
+    def _move_to_machine_position(self, code: str, values: Mapping[str, float]) -> None:
         """Go to a place that is the machine's own: where that is in the part is not known."""
         machine = self.machine
         turned = [name for name in "ABC" if name in values]
@@ -355,7 +378,7 @@ class _Reader:
         machine.rapid(self._part(self._at), machine.axis)
         machine.note_home(code, "X, Y and Z are given")
 
-    def _set(self, values: Mapping[str, float]) -> None:
+    def _set_position(self, values: Mapping[str, float]) -> None:
         """Say how far material is fed by now, or, before anything has moved, where the tool is."""
         moved = [name for name in _AXES if name in values]
         is_first = not self.machine.cuts and np.isnan(self._at).all() and "E" not in values
@@ -374,6 +397,7 @@ class _Reader:
         """Return how much material a line feeds: by differences after M83, and after G91, too."""
         if "E" not in values:
             return 0.0
+        self._has.add("material")
         # So do Marlin and Klipper; G90 leaves what M82 and M83 said (Klipper).
         if self._fed_from_start and self._absolute:
             fed, self._fed = values["E"] - self._fed, values["E"]
@@ -383,12 +407,13 @@ class _Reader:
         return fed
 
     @property
-    def _travels(self) -> bool:
+    def _is_rapid(self) -> bool:
         return self._motion == 0 and not self._cycle
 
     def _drill(self, values: Mapping[str, float]) -> None:
         """Drill a hole of the cycle, where X or Y is given."""
         machine = self.machine
+        self._has.add("hole")
         self._take_feed(values)
         if self._plane != _PLANES["G17"]:
             raise machine.fault(f"{self._cycle} drills along Z: say G17")
@@ -414,7 +439,7 @@ class _Reader:
         above, bottom = goal.copy(), goal.copy()
         above[2], bottom[2] = self._hole["R"], self._hole["Z"]
         is_turned = self._rotary is None or self._tip
-        if is_turned and np.abs(axis - [0.0, 0.0, 1.0]).max() > _SAME:
+        if is_turned and np.abs(axis - [0.0, 0.0, 1.0]).max() > _SAME_AXIS:
             raise machine.fault(f"{self._cycle} drills along Z, and the tool is tilted")
         pecks = None
         if self._cycle in ("G73", "G83"):
@@ -423,8 +448,8 @@ class _Reader:
         waits = self._cycle in ("G82", "G89") and self._hole.get("P", 0.0) > 0.0
         if np.isfinite(self._at[2]):
             # Over the hole at the height where it is, or where the hole begins if that is above.
-            for place in (self._at, goal):
-                over = place.copy()
+            for point in (self._at, goal):
+                over = point.copy()
                 over[2] = max(self._at[2], self._hole["R"])
                 machine.rapid(self._part(over), axis)
         drill(
@@ -442,6 +467,7 @@ class _Reader:
 
     def _take_feed(self, values: Mapping[str, float]) -> None:
         if "F" in values:
+            self._has.add("feed")
             if not 0.0 < values["F"] < 1e7:
                 raise self.machine.fault(f"F is {values['F']:g}, expected a feed above 0")
             scale = 1.0 if self._inverse_time else self._unit
@@ -460,6 +486,10 @@ class _Reader:
             if fed > 0.0:
                 machine.happens(PRIME)
             return
+        if self._said.isdisjoint(_MOTIONS):
+            machine.note("neither this line nor one before says G0, G1, G2 or G3: it is a rapid")
+        if arc:
+            self._has.add("arc")
         before, start = dict(self._turns), self._at.copy()
         goal = self._at.copy()
         for k, name in enumerate("XYZ"):
@@ -492,10 +522,10 @@ class _Reader:
         """Go to poses at the feed; where F says how often a minute, over all of them."""
         machine, feed = self.machine, self.machine.feed
         if self._inverse_time:
-            places = np.array([machine.position, *(place for place, _ in poses)])
-            machine.feed = feed * float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-        for place, axis in poses:
-            machine.cut(place, axis)
+            points = np.array([machine.position, *(point for point, _ in poses)])
+            machine.feed = feed * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        for point, axis in poses:
+            machine.cut(point, axis)
         machine.feed = feed
 
     def _line(
@@ -513,8 +543,8 @@ class _Reader:
                 name: before.get(name, 0.0) + share * (angle - before.get(name, 0.0))
                 for name, angle in self._turns.items()
             }
-            place = rotary.in_part(start + share * (goal - start), turns)
-            found.append((place, rotary.rotation(turns)[:, 2]))
+            point = rotary.in_part(start + share * (goal - start), turns)
+            found.append((point, rotary.rotation(turns)[:, 2]))
         return [*found, (self._part(goal), axis)]
 
     def _part(self, position: Array) -> Array:
@@ -530,6 +560,8 @@ class _Reader:
                 before = 0.0 if self._absolute else self._turns.get(name, 0.0)
                 self._turns[name] = np.radians(values[name]) + before
         given = [name for name in "IJK" if name in values]
+        if (given and not arc) or any(name in values for name in "ABC"):
+            self.machine.says_axis = True
         if given and not arc:
             if len(given) < 3 or any(name in values for name in "ABC"):
                 raise self.machine.fault("a tool axis is I, J and K, all three, and not A, B, C")
@@ -583,8 +615,8 @@ class _Reader:
     def _more_turns(self, values: Mapping[str, float]) -> int:
         """Return how many whole turns an arc makes besides: P counts the one that it ends in."""
         turns = values.get("P", 1.0)
-        if turns != round(turns) or not 1.0 <= turns <= _TURNS:
+        if turns != round(turns) or not 1.0 <= turns <= _MAX_TURNS:
             raise self.machine.fault(
-                f"P of an arc is {turns:g}, expected a number of turns: 1 to {_TURNS}"
+                f"P of an arc is {turns:g}, expected a number of turns: 1 to {_MAX_TURNS}"
             )
         return int(turns) - 1

@@ -21,36 +21,36 @@ from selfmotion.model.path import (
     section_at_rest,
 )
 from selfmotion.shop.cam.cuts import RAPID
-from selfmotion.shop.cam.path_rows import DRAWING, PoseRows, some_rows
+from selfmotion.shop.cam.path_rows import CLDATA, DRAWING, PROGRAMS, PoseRows, selected_rows
 from selfmotion.shop.cam.tangents import AXES, sections_along, turning
 
 # Largest coordinate in metres [m]; one beyond can only be meant in millimetres.
-_FAR = 50.0
+_MAX_COORDINATE = 50.0
 # Distance of a pose from the one before that is a jump, unless another one is given [m].
 JUMP = 0.5
 # Rotation between poses that is a jump as well [rad]: its direction would be a guess.
-_FLIP = 2.6
+_MAX_ROTATION = 2.6
 # Difference of times that are the same [s].
-_MOMENT = 1e-9
+_SAME_TIME = 1e-9
 # Angle between legs from which on they make a corner, unless another one is given [rad].
-_BEND = np.pi / 6
+_CORNER_ANGLE = np.pi / 6
 # Distance of repeated poses [m].
-_REPEATED = 1e-9
+_SAME_POSE = 1e-9
 # Largest length of a stub, as a share of the steps beside it.
-_STUB = 0.05
+_STUB_SHARE = 0.05
 # Largest rotation of the tool along a stub [rad].
 _TURN_TOLERANCE = 1e-2
 # Longest run-up of a path with a duration [s].
 _RAMP = 0.5
 # Number of places between two poses at which a curve is evaluated.
-_LOOKS = 9
+_SAMPLES = 9
 # Difference from -1 of the cosine between legs of which the second goes back along the first.
-_BACK = 1e-3
+_REVERSAL = 1e-3
 
 
 @dataclass(frozen=True)
 class Pacing:
-    """How a table is followed; see `read_path`."""
+    """Options of timing and corners of a path from a file; see `read_path`."""
 
     feed: float | None = None
     duration: float | None = None
@@ -91,26 +91,26 @@ def path_of_rows(path: FilePath, rows: PoseRows, pacing: Pacing) -> Path:
         raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
     _check_rows(path, rows)
     if pacing.flip_normals:
-        rows = _flipped(path, rows)
+        rows = _with_flipped_normals(path, rows)
     rotations = _rotations(path, rows)
     _check_jumps(path, rows, rotations, pacing.jump)
     rows, rotations = _without_stubs(rows, rotations, pacing)
     if pacing.standoff:
-        rows = _stood_off(path, rows, rotations, pacing.standoff)
+        rows = _with_standoff(path, rows, rotations, pacing.standoff)
     turns = _quaternions(rotations) if rows.orientation else None
     try:
         _check_corners(pacing)
         if pacing.along is not None:
-            made = _along(rows, rotations, pacing)
+            made = _aligned_path(rows, rotations, pacing)
         elif pacing.lead or pacing.tilt or pacing.lift:
             name = next(x for x in ("lead", "tilt", "lift") if getattr(pacing, x))
             raise PathError(
                 f"{name} has no effect without along (x, -x, y, -y); drop it, or give it"
             )
         elif rows.straight:
-            made = _of_cut(rows, turns, pacing)
+            made = _cut_path(rows, turns, pacing)
         else:
-            made = _of_table(path, rows, turns, pacing)
+            made = _table_path(path, rows, turns, pacing)
         is_ramped = pacing.ramp is not None and pacing.duration is None
         found = section_at_rest(made, ramp=pacing.ramp or 0.0) if is_ramped else made
     # Splines refuse times that differ, but by less than they can divide by.
@@ -136,11 +136,11 @@ def _check_corners(pacing: Pacing) -> None:
         )
 
 
-def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
+def _table_path(file: FilePath, rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
     """Return the tool motion of a table."""
     feed, duration, bounds = pacing.feed, pacing.duration, pacing.bounds
     # The ramps are part of the duration, and go half as far as they last.
-    moving = None if duration is None else _moving(file, duration, pacing)
+    moving = None if duration is None else _time_at_speed(file, duration, pacing)
     in_place = pacing.corners == "round" and moving is None
     t = _times(file, rows, feed, moving, turns_in_place=in_place)
     feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
@@ -152,14 +152,14 @@ def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, pacing: Pacin
         legs = Polyline(rows.positions, turns, tolerance=pacing.tolerance)
         steady = _steady(rows.positions, feeds, pacing.tolerance)
         return _at_feed(legs, legs.pose_times, steady, bounds)
-    return _noted(_through(t, rows, turns, feeds, pacing), t, rows, pacing)
+    return _with_deviation_note(_waypoint_path(t, rows, turns, feeds, pacing), t, rows, pacing)
 
 
-def _through(
+def _waypoint_path(
     t: Array, rows: PoseRows, turns: Array | None, feeds: Array | None, pacing: Pacing
 ) -> Path:
     """Return a smooth path through poses."""
-    bend = _BEND if pacing.corner_angle is None else pacing.corner_angle
+    bend = _CORNER_ANGLE if pacing.corner_angle is None else pacing.corner_angle
     through = Waypoints(t, rows.positions, turns, corners=pacing.corners, corner_angle=bend)
     through.samples([0.0])
     if feeds is None:
@@ -168,13 +168,13 @@ def _through(
     passed = t - t[0]
     for section in through.between_corners():
         # From one rest to the next.
-        here = (passed >= -_MOMENT) & (passed <= section.duration + _MOMENT)
+        here = (passed >= -_SAME_TIME) & (passed <= section.duration + _SAME_TIME)
         sections.append(_at_feed(section, passed[here], feeds[here], pacing.bounds))
         passed = passed - section.duration
     return sections[0] if len(sections) == 1 else Joined(sections)
 
 
-def _moving(file: FilePath, duration: float, pacing: Pacing) -> float:
+def _time_at_speed(file: FilePath, duration: float, pacing: Pacing) -> float:
     """Return how long a path that is run up and down takes at its own speed [s]."""
     ramp = 0.0 if pacing.corners == "stop" else _ramp(pacing)
     if not 0.0 <= 2.0 * ramp <= duration:
@@ -194,7 +194,7 @@ def _ramp(pacing: Pacing) -> float:
     return min(_RAMP, 0.25 * (pacing.duration or 0.0)) if pacing.ramp is None else pacing.ramp
 
 
-def _noted(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -> Path:
+def _with_deviation_note(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -> Path:
     """Give a path a note where it leaves the straight lines between its poses."""
     if pacing.corners != "blend" or rows.t is not None:
         return path
@@ -203,18 +203,18 @@ def _noted(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -> Path:
     sound = (lengths[:-1] > 0.0) & (lengths[1:] > 0.0)
     products = np.where(sound, lengths[:-1] * lengths[1:], 1.0)
     cosines = np.where(sound, (legs[:-1] * legs[1:]).sum(axis=1) / products, 1.0)
-    if not (cosines < np.cos(_BEND)).any():
+    if not (cosines < np.cos(_CORNER_ANGLE)).any():
         return path
     curve = Waypoints(t, rows.positions, corners="blend")
-    shares = np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]
+    shares = np.linspace(0.0, 1.0, _SAMPLES + 2)[1:-1]
     times = (t[:-1, None] + np.diff(t)[:, None] * shares - t[0]).ravel()
-    places = curve.samples(times).translation.reshape(len(legs), _LOOKS, 3)
-    places = places - rows.positions[:-1, None]
+    points = curve.samples(times).translation.reshape(len(legs), _SAMPLES, 3)
+    points = points - rows.positions[:-1, None]
     squares = np.where(lengths > 0.0, lengths**2, 1.0)
-    along = np.clip(np.einsum("klc,kc->kl", places, legs) / squares[:, None], 0.0, 1.0)
-    away = np.linalg.norm(places - along[:, :, None] * legs[:, None], axis=2).max(axis=1)
-    worst = int(away.argmax())
-    if away[worst] > pacing.tolerance:
+    along = np.clip(np.einsum("klc,kc->kl", points, legs) / squares[:, None], 0.0, 1.0)
+    distances = np.linalg.norm(points - along[:, :, None] * legs[:, None], axis=2).max(axis=1)
+    worst = int(distances.argmax())
+    if distances[worst] > pacing.tolerance:
         has_feed = rows.feed is not None or pacing.feed is not None
         remedy = (
             f"corners round (--corners round) keeps {1e3 * pacing.tolerance:g} mm"
@@ -225,14 +225,14 @@ def _noted(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -> Path:
         bends = np.concatenate([[1.0], cosines, [1.0]])[worst : worst + 2]
         kink = worst + int(bends.argmin())
         note = (
-            f"the path leaves the straight lines between poses by up to {1e3 * away[worst]:.1f} mm "
-            f"at {rows.places[kink]}: {remedy}"
+            f"the path leaves the straight lines between poses by up to "
+            f"{1e3 * distances[worst]:.1f} mm at {rows.labels[kink]}: {remedy}"
         )
         return path.noted([note])
     return path
 
 
-def _flipped(file: FilePath, rows: PoseRows) -> PoseRows:
+def _with_flipped_normals(file: FilePath, rows: PoseRows) -> PoseRows:
     """Return rows whose normals point the other way."""
     if rows.orientation != "normal":
         raise FileFormatError(
@@ -241,7 +241,7 @@ def _flipped(file: FilePath, rows: PoseRows) -> PoseRows:
     return replace(rows, values=-rows.values)
 
 
-def _stood_off(file: FilePath, rows: PoseRows, rotations: Array, standoff: float) -> PoseRows:
+def _with_standoff(file: FilePath, rows: PoseRows, rotations: Array, standoff: float) -> PoseRows:
     """Return rows whose tip is held back along the tool's z axis."""
     if not rows.orientation:
         raise FileFormatError(
@@ -250,7 +250,7 @@ def _stood_off(file: FilePath, rows: PoseRows, rotations: Array, standoff: float
     return replace(rows, positions=rows.positions - standoff * rotations[:, :, 2])
 
 
-def _of_cut(rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
+def _cut_path(rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
     """Return the straight legs of a cut or stroke, which rests where it goes back on itself."""
     if pacing.duration is not None:
         raise PathError("straight legs go at a feed, so that duration has no effect; drop it")
@@ -270,7 +270,7 @@ def _of_cut(rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
             if is_rapid
             else _steady(rows.positions[part], feeds[part], pacing.tolerance)
         )
-        ends = first + _rests(rows.positions[part], orientations[part], pacing)
+        ends = first + _rest_poses(rows.positions[part], orientations[part], pacing)
         for begin, end in pairwise(ends.tolist()):
             leg = slice(begin, end + 1)
             section = Polyline(
@@ -287,15 +287,26 @@ def _of_cut(rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
 
 
 class _CutSection(NamedTuple):
-    """Places (K, 3), rotations there, feeds from each on, and whether no feed is pacing for."""
+    """A section of a path between corners, or a turn in one.
 
-    places: Array
-    turns: Array
+    Attributes
+    ----------
+    positions : (K, 3)
+        [m]
+    rotations : (K, 3, 3)
+    feeds : (K,)
+        From each pose on [m/s].
+    is_free : bool
+        Whether it is a rapid or a turn, at no feed that is judged.
+    """
+
+    positions: Array
+    rotations: Array
     feeds: Array
     is_free: bool
 
 
-def _along(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
+def _aligned_path(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
     """Return straight legs along which an axis of the tool points where it goes."""
     along = as_choice(pacing.along, "along", tuple(AXES), PathError)
     if pacing.corners == "blend":
@@ -318,7 +329,7 @@ def _along(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
         raise PathError(f"along = '{along}' needs a feed [m/s]; give it")
     axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
     rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
-    bend = _BEND if pacing.corner_angle is None else pacing.corner_angle
+    bend = _CORNER_ANGLE if pacing.corner_angle is None else pacing.corner_angle
     found = sections_along(rows.positions, axes, rapid, along, (pacing.lead, pacing.tilt), bend)
     sections: list[_CutSection] = []
     for number, (first, last, turns) in enumerate(found):
@@ -327,31 +338,33 @@ def _along(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
             # Of two cuts: a rapid leaves the part by itself.
             beside_rapid = rapid[found[number - 1].first] or rapid[first]
             is_lifted = pacing.lift > 0.0 and not beside_rapid
-            away = -pacing.lift * axes[first] if is_lifted else np.zeros(3)
-            sections += _turned(rows.positions[first], np.array(before), float(feeds[first]), away)
+            offset = -pacing.lift * axes[first] if is_lifted else np.zeros(3)
+            sections += _turn_sections(
+                rows.positions[first], np.array(before), float(feeds[first]), offset
+            )
         part = slice(first, last + 1)
         sections.append(_CutSection(rows.positions[part], turns, feeds[part], bool(rapid[first])))
     if pacing.corners == "round":
-        sections = _run_together(sections, [bool(rapid[item.first]) for item in found])
+        sections = _joined_sections(sections, [bool(rapid[item.first]) for item in found])
     paths: list[Path] = []
-    for places, turns, own, is_free in sections:
-        if not is_free or np.ptp(places, axis=0).max() > 0.0 or _is_turned(turns):
-            legs = Polyline(places, _quaternions(turns), tolerance=pacing.tolerance)
+    for points, turns, own, is_free in sections:
+        if not is_free or np.ptp(points, axis=0).max() > 0.0 or _rotates(turns):
+            legs = Polyline(points, _quaternions(turns), tolerance=pacing.tolerance)
             if is_free:
                 paths.append(Feed(legs, RAPID, required=False, **pacing.bounds))
             else:
-                steady = _steady(places, own, pacing.tolerance)
+                steady = _steady(points, own, pacing.tolerance)
                 paths.append(_at_feed(legs, legs.pose_times, steady, pacing.bounds))
     return paths[0] if len(paths) == 1 else Joined(paths)
 
 
-def _turned(place: Array, turns: Array, feed: float, away: Array) -> list[_CutSection]:
-    """Return the turn (K, 3, 3) at a corner: on the spot, or away (3,) from it and back."""
+def _turn_sections(corner: Array, turns: Array, feed: float, offset: Array) -> list[_CutSection]:
+    """Return the sections of a turn at a corner: on the spot, or lifted by an offset (3,)."""
     count = len(turns)
-    spot = _CutSection(np.tile(place + away, (count, 1)), turns, np.full(count, feed), True)
-    if not away.any() or not _is_turned(turns):
+    spot = _CutSection(np.tile(corner + offset, (count, 1)), turns, np.full(count, feed), True)
+    if not offset.any() or not _rotates(turns):
         return [spot]
-    sides = (([place, place + away], turns[0]), ([place + away, place], turns[-1]))
+    sides = (([corner, corner + offset], turns[0]), ([corner + offset, corner], turns[-1]))
     up, down = (
         _CutSection(np.array(ends), np.array([turn, turn]), np.full(2, feed), True)
         for ends, turn in sides
@@ -359,23 +372,23 @@ def _turned(place: Array, turns: Array, feed: float, away: Array) -> list[_CutSe
     return [up, spot, down]
 
 
-def _is_turned(turns: Array) -> bool:
+def _rotates(turns: Array) -> bool:
     """Whether rotations differ by more than rounding."""
-    return bool(np.abs(turns - turns[0]).max() > _REPEATED)
+    return bool(np.abs(turns - turns[0]).max() > _SAME_POSE)
 
 
-def _run_together(sections: Sequence[_CutSection], rapid: Sequence[bool]) -> list[_CutSection]:
+def _joined_sections(sections: Sequence[_CutSection], rapid: Sequence[bool]) -> list[_CutSection]:
     """Return sections of which those at a feed, and turns between two of them, are one."""
     found: list[_CutSection] = []
     for number, section in enumerate(sections):
-        # Turns stand between stretches.
+        # Turns stand between the sections of legs.
         beside = rapid[number // 2 : number // 2 + 1 + number % 2]
         at_feed = not any(beside)
         if found and at_feed and not found[-1].is_free:
             last = found[-1]
             pairs = (
-                (last.places, section.places),
-                (last.turns, section.turns),
+                (last.positions, section.positions),
+                (last.rotations, section.rotations),
                 (last.feeds, section.feeds),
             )
             joined = [np.concatenate([one, other[1:]]) for one, other in pairs]
@@ -385,16 +398,16 @@ def _run_together(sections: Sequence[_CutSection], rapid: Sequence[bool]) -> lis
     return found
 
 
-def _rests(positions: Array, turns: Array, pacing: Pacing) -> Ints:
+def _rest_poses(positions: Array, turns: Array, pacing: Pacing) -> Ints:
     """Return at which poses a tool rests: both ends, where it goes back on itself, or corners."""
     apart = merged(positions, turns, pacing.tolerance, _TURN_TOLERANCE).kept
     legs = np.diff(positions[apart], axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
-    least = _BACK - 1.0
+    least = _REVERSAL - 1.0
     if pacing.corners == "stop":
-        least = np.cos(_BEND if pacing.corner_angle is None else pacing.corner_angle)
+        least = np.cos(_CORNER_ANGLE if pacing.corner_angle is None else pacing.corner_angle)
     inner = apart[1 + np.flatnonzero(cosines < least)]
     return np.array([0, *inner.tolist(), len(positions) - 1])
 
@@ -430,7 +443,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, pacing: Pacing) -> tuple[Po
             for a, b in ((k, k + 1), (chosen[-1] - 1, chosen[-1]))
             if a >= 0 and b < count
         ]
-        short = step <= _REPEATED or (step < pacing.tolerance and step < _STUB * min(others))
+        short = step <= _SAME_POSE or (step < pacing.tolerance and step < _STUB_SHARE * min(others))
         cosine = 0.5 * (np.sum(rotations[k] * rotations[chosen[-1]]) - 1.0)
         if not (short and np.arccos(np.clip(cosine, -1.0, 1.0)) <= _TURN_TOLERANCE):
             chosen.append(k)
@@ -439,7 +452,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, pacing: Pacing) -> tuple[Po
             chosen[-1] = k
     if len(chosen) in (1, count):
         return rows, rotations
-    return some_rows(rows, chosen), rotations[chosen]
+    return selected_rows(rows, chosen), rotations[chosen]
 
 
 def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, Any]) -> Feed:
@@ -457,10 +470,10 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
         flat = values.reshape(len(values), -1)
         bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
         if bad.size:
-            place = rows.places[int(bad[0])]
-            raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
+            label = rows.labels[int(bad[0])]
+            raise FileFormatError(f"{file}: {label}: the {what} is not finite; mend or drop it")
     for what, values, bound, remedy in (
-        ("position", rows.positions, _FAR, f"metres; {_units(file, rows)}"),
+        ("position", rows.positions, _MAX_COORDINATE, f"metres; {_units_remedy(file, rows)}"),
         ("angle", rows.values, TURN, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
     ):
         if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
@@ -469,13 +482,13 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
         if len(far):
             row, column = far[0]
             found = f"{what} {values[row, column]:.6g}"
-            raise FileFormatError(f"{file}: {rows.places[row]}: {found} is taken for {remedy}")
+            raise FileFormatError(f"{file}: {rows.labels[row]}: {found} is taken for {remedy}")
     if rows.t is not None:
         late = np.flatnonzero(np.diff(rows.t) <= 0.0)
         if late.size:
             row = int(late[0]) + 1
             raise FileFormatError(
-                f"{file}: {rows.places[row]}: time {rows.t[row]:.6g} s does not come after "
+                f"{file}: {rows.labels[row]}: time {rows.t[row]:.6g} s does not come after "
                 f"{rows.t[row - 1]:.6g} s; times must increase"
             )
 
@@ -485,12 +498,12 @@ def _rotations(file: FilePath, rows: PoseRows) -> Array:
         return np.tile(np.eye(3), (len(rows.positions), 1, 1))
     _, rotation = ORIENTATIONS[rows.orientation]
     found = list[Array]()
-    for k, (place, values) in enumerate(zip(rows.places, rows.values, strict=True)):
+    for k, (label, values) in enumerate(zip(rows.labels, rows.values, strict=True)):
         try:
             again = k > 0 and np.array_equal(values, rows.values[k - 1])
             found.append(found[-1] if again else rotation(values))
         except (ValueError, PathError) as error:
-            raise FileFormatError(f"{file}: {place}: {error}") from error
+            raise FileFormatError(f"{file}: {label}: {error}") from error
     return np.array(found)
 
 
@@ -505,28 +518,36 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
         # Both ends of a seam: no pose between them is missing.
         steps = np.zeros(1)
     for what, amounts, bound, unit, remedy in (
-        ("jumps by", steps, jump, "m", _remedy(jump, _units(file, rows))),
-        ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
+        ("jumps by", steps, jump, "m", _jump_remedy(jump, _units_remedy(file, rows))),
+        (
+            "turns by",
+            turns,
+            _MAX_ROTATION,
+            "rad",
+            "which has no clear direction; add poses between",
+        ),
     ):
         far = np.flatnonzero(amounts > bound)
         if far.size:
             row = int(far[0]) + 1
             raise FileFormatError(
-                f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
+                f"{file}: {rows.labels[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
                 f"the pose before, {remedy}"
             )
 
 
-def _remedy(jump: float, units: str) -> str:
+def _jump_remedy(jump: float, units: str) -> str:
     return f"more than {jump:g} m; give a larger jump if it is meant, or {units}"
 
 
-def _units(file: FilePath, rows: PoseRows) -> str:
+def _units_remedy(file: FilePath, rows: PoseRows) -> str:
     """Return the remedy, in words, where lengths are in another unit than they are taken for."""
     if file.suffix.lower() == DRAWING:
         return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
-    if rows.straight:
+    if file.suffix.lower() in (*PROGRAMS, *CLDATA):
         return "mend the file's units (G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+    if rows.straight:
+        return "write its places in the unit of its form, or as a table with x_mm,y_mm,z_mm"
     return "name the columns x_mm,y_mm,z_mm if they are millimetres"
 
 
@@ -553,7 +574,7 @@ def _times(
         if bad.size:
             row = int(bad[0])
             raise FileFormatError(
-                f"{file}: {rows.places[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
+                f"{file}: {rows.labels[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
                 f"above 0"
             )
     elif len(named) != 1:
@@ -565,7 +586,7 @@ def _times(
     standing = np.flatnonzero(steps == 0.0)
     if standing.size and not turns_in_place:
         raise FileFormatError(
-            f"{file}: {rows.places[int(standing[0]) + 1]}: the tool does not move from the pose "
+            f"{file}: {rows.labels[int(standing[0]) + 1]}: the tool does not move from the pose "
             f"before, which takes no time by feed or duration; give a column t, or a feed with "
             f"corners round (--corners round), where the tool turns in place"
         )

@@ -37,15 +37,15 @@ def times_of_events(path: Path, rows: PoseRows) -> list[tuple[str, float]]:
     if passed is not None and len(passed) == len(rows.positions):
         return [(event, float(passed[k])) for k, event in rows.events]
     t = np.linspace(0.0, path.duration, max(_LOOKS, _EACH * len(rows.positions)))
-    places = path.samples(t).translation
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    points = path.samples(t).translation
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     chords = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
     shares = np.append(0.0, np.cumsum(chords)) * (length[-1] / max(float(chords.sum()), _NOTHING))
     found = []
     for k, event in rows.events:
         early, late = shares[max(k - 1, 0)], shares[min(k + 1, len(shares) - 1)]
         near = np.flatnonzero((length >= early) & (length <= late))
-        away = np.linalg.norm(places[near] - rows.positions[k], axis=1)
+        away = np.linalg.norm(points[near] - rows.positions[k], axis=1)
         at = float(t[near[int(away.argmin())]]) if len(near) else 0.0
         ends = {0: 0.0, len(shares) - 1: path.duration}
         found.append((event, float(ends.get(k, at))))

@@ -1,4 +1,4 @@
-"""Tool motions from files: tables, arrays, lists of poses, programs of machine tools, drawings."""
+"""Paths from files: tables, arrays, lists of poses, programs of machine tools, drawings."""
 
 from __future__ import annotations
 
@@ -36,10 +36,12 @@ from selfmotion.shop.cam.pose_lists import READ
 
 
 def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    """Return the poses of a table in the form of another program, or by its header."""
     peers = None if reading.columns else peer_table(file)
     return READERS[file.suffix.lower()](file, reading) if peers is None else peers
 
 
+# Suffix → reader of the poses of each seam.
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
     **dict.fromkeys(TABLES, _read_table),
@@ -47,8 +49,8 @@ _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = 
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
 }
-# Programs of robots, which are no paths.
-_CONTROLLERS = {
+# Suffixes of robot programs, which are not read as paths → the maker.
+_ROBOT_PROGRAMS = {
     ".mod": "ABB",
     ".prg": "ABB",
     ".src": "KUKA",
@@ -64,7 +66,7 @@ _CONTROLLERS = {
     ".pgx": "Stäubli",
     ".urp": "Universal Robots",
 }
-# Of files that can be nothing but a path.
+# Suffixes of files that are always paths.
 PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
 
 
@@ -96,7 +98,7 @@ def read_path(
     rotary_center: npt.ArrayLike | None = None,
     unit: str | None = None,
 ) -> Path:
-    """Read a tool motion through poses.
+    """Read the path of a tool through the poses of a file.
 
     - ``.csv .txt .tsv``: columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
       ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]), ``roll,pitch,yaw`` [rad],
@@ -264,7 +266,7 @@ def read_path(
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
-    """Read all seams or cuts of a file: name → its motion, and the rows that it is of.
+    """Read all seams or cuts of a file: name → path, and the poses that it is made of.
 
     Options are those of `read_path`.
 
@@ -303,16 +305,16 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
 
 
 def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:
-    """Return the rows of a file by the names of its seams, of a drawing those of one layer."""
+    """Return the poses of a file by the names of its seams; of a drawing those of one layer."""
     suffix = path.suffix.lower()
     if suffix == DRAWING:
         return read_drawing(path, seam, reading.unit)
     reader = _READERS.get(suffix)
     if reader is None:
         known = ", ".join((*_READERS, DRAWING))
-        if suffix in _CONTROLLERS:
+        if suffix in _ROBOT_PROGRAMS:
             raise FileFormatError(
-                f"{path}: is a program of a robot ({_CONTROLLERS[suffix]}): as a path it is not "
+                f"{path}: is a program of a robot ({_ROBOT_PROGRAMS[suffix]}): as a path it is not "
                 f"read. One that selfmotion wrote is judged by `selfmotion check`; of another one "
                 f"write its targets as a table (x_mm,y_mm,z_mm and qw,qx,qy,qz or "
                 f"roll_deg,pitch_deg,yaw_deg; feed_mm), or as G-code"
@@ -322,7 +324,7 @@ def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, Po
 
 
 def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the events along a path of a file, each once; none of one that is refused."""
+    """Return the events of a path from a file, without duplicates; none if it cannot be read."""
     try:
         rows = one_seam(file, options.get("seam"), Reading.of(file, options))
         return tuple(dict.fromkeys(event for _, event in rows.events))
@@ -331,7 +333,7 @@ def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def has_normals(file: FilePath, options: Mapping[str, Any]) -> bool:
-    """Return whether a path of a file says the tool's axis by normals; of one refused, no."""
+    """Return whether the tool's axis is given by normals; False if the file cannot be read."""
     try:
         rows = one_seam(file, options.get("seam"), Reading.of(file, options))
     except FileFormatError:
@@ -340,7 +342,7 @@ def has_normals(file: FilePath, options: Mapping[str, Any]) -> bool:
 
 
 def one_seam(path: FilePath, seam: str | None, reading: Reading) -> PoseRows:
-    """Return the rows of one seam of a file."""
+    """Return the poses of one seam of a file, which may be left out where the file has one."""
     seams = _read(path, seam, reading)
     if seam is None and len(seams) == 1:
         return next(iter(seams.values()))

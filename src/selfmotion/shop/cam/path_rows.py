@@ -40,8 +40,10 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
 }
 
 
-_TURN = ("rx", "ry", "rz")
-_TURN_NOTE = "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
+_ROTATION_VECTOR = ("rx", "ry", "rz")
+_ROTATION_VECTOR_NOTE = (
+    "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
+)
 # Half a turn that is written with few digits is more than that by such a share.
 _HALF_TURN = 2e-4
 
@@ -60,13 +62,13 @@ _ARRAYS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
 _BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
 _BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
-_ALSO = {"time": "t", "timestamp": "t"}
+_SYNONYMS = {"time": "t", "timestamp": "t"}
 # Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
-_PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
-_TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
+_POSITION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
+_QUATERNION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
 # The first word of a program.
-_CODE = re.compile(r"[gmn][0-9]+|%")
-_TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
+_GCODE_WORD = re.compile(r"[gmn][0-9]+|%")
+_TITLE_WITH_UNIT = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 # Column with the name of a row's seam.
 SEAM = "seam"
 # Column with the events at a row.
@@ -75,7 +77,7 @@ _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in name
 
 
 # Names of orientations of makers of controllers → their names here.
-_MAKERS = {
+_MAKERS_TITLES = {
     **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
     **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
     **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
@@ -83,17 +85,24 @@ _MAKERS = {
 
 
 # Columns of a frame of KUKA's → their names here.
-_KUKA = {"a": "yaw_deg", "b": "pitch_deg", "c": "roll_deg", "x": "x_mm", "y": "y_mm", "z": "z_mm"}
+_KUKA_TITLES = {
+    "a": "yaw_deg",
+    "b": "pitch_deg",
+    "c": "roll_deg",
+    "x": "x_mm",
+    "y": "y_mm",
+    "z": "z_mm",
+}
 _KUKA_NOTE = (
     "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
     "where they say no unit"
 )
 # Coordinate above which lengths are no metres: no arm reaches so far [m].
-_METRES = 10.0
+_MAX_METRES = 10.0
 
 
 # Names that are long enough to be taken for one another.
-_LONG = ("feed", "roll", "pitch", "yaw")
+_HINTED = ("feed", "roll", "pitch", "yaw")
 
 
 _UNITS = {
@@ -110,7 +119,7 @@ class PoseRows:
 
     Attributes
     ----------
-    places : sequence of str
+    labels : sequence of str
         "line 7", "poses[6]", …
     positions : (N, 3)
     orientation : str
@@ -133,7 +142,7 @@ class PoseRows:
         nowhere.
     """
 
-    places: Sequence[str]
+    labels: Sequence[str]
     positions: Array
     orientation: str
     values: Array
@@ -207,13 +216,13 @@ class Reading:
 
 
 # Largest number of seams that a message names.
-_LISTED = 5
+_MAX_LISTED = 5
 
 
 def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatError:
     """Return an error that says which seams a file has, those of a like name if there are any."""
-    listed = ", ".join(repr(name) for name in names[:_LISTED])
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    listed = ", ".join(repr(name) for name in names[:_MAX_LISTED])
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
     return FileFormatError(
         f"{file}: has no seam '{seam}'{nearest(seam, names) or f'; it has {listed}{more}'}"
     )
@@ -225,7 +234,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
 
     def called(title: str) -> str:
         """Return the name of a title here, and remember those that state their unit."""
-        name = named(title)
+        name = column_name(title)
         if "[" in title or "(" in title:
             said.add(name)
         return name
@@ -233,13 +242,13 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     header, table, lines, texts = read_rows(
         file,
         (SEAM, EVENT),
-        check=lambda names: [_meant(file, name) for name in _of_kuka(names)],
+        check=lambda names: [_si_column(file, name) for name in _kuka_titles(names)],
         columns=None if reading is None else reading.columns,
         named=called,
         usual=_HEADERS,
     )
-    places = [f"line {number}" for number in lines]
-    whole = rows_of_table(file, header, table, places, texts, said)
+    labels = [f"line {number}" for number in lines]
+    whole = rows_of_table(file, header, table, labels, texts, said)
     if SEAM not in texts:
         return {"": whole}
     if not lines:
@@ -248,15 +257,15 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
     if blank is not None:
         raise FileFormatError(f"{file}: line {blank}: names no seam")
-    return {name: some_rows(whole, [k for k, other in enumerate(names) if other == name])
+    return {name: selected_rows(whole, [k for k, other in enumerate(names) if other == name])
             for name in dict.fromkeys(names)}  # fmt: skip
 
 
-def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
+def selected_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
     """Return some of the rows."""
     new = {old: k for k, old in enumerate(chosen)}
     return PoseRows(
-        [rows.places[k] for k in chosen],
+        [rows.labels[k] for k in chosen],
         rows.positions[chosen],
         rows.orientation,
         rows.values[chosen],
@@ -274,7 +283,7 @@ def rows_of_table(
     file: FilePath,
     header: Sequence[str],
     table: Array,
-    places: Sequence[str],
+    labels: Sequence[str],
     texts: Mapping[str, Sequence[str]],
     said: Collection[str] = (),
 ) -> PoseRows:
@@ -283,12 +292,12 @@ def rows_of_table(
     Of `said` columns the file says the unit, though their names do not.
     """
     notes: tuple[str, ...] = ()
-    if (titles := _of_kuka(header)) != list(header):
+    if (titles := _kuka_titles(header)) != list(header):
         _check_millimetres(file, header, table)
         header, notes = titles, (_KUKA_NOTE,)
     columns = _columns(file, header, table)
-    notes += _unsaid([title for title in header if title not in said])
-    events = texts.get(EVENT, [""] * len(places))
+    notes += _units_note([title for title in header if title not in said])
+    events = texts.get(EVENT, [""] * len(labels))
     missing = [name for name in _POSITION if name not in columns]
     if missing:
         raise FileFormatError(
@@ -310,64 +319,72 @@ def rows_of_table(
                 f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
             )
         values = np.stack([columns[name] for name in names], axis=1)
-    if given == [_TURN]:
-        unit = "_deg" if any(named(title) == "rx_deg" for title in header) else ""
+    if given == [_ROTATION_VECTOR]:
+        unit = "_deg" if any(column_name(title) == "rx_deg" for title in header) else ""
         angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
-        _check_turns(file, values, places, angles)
-        notes += (f"{_TURN_NOTE}; angles about fixed axes are called {angles}",)
+        _check_rotation_vectors(file, values, labels, angles)
+        notes += (f"{_ROTATION_VECTOR_NOTE}; angles about fixed axes are called {angles}",)
     return PoseRows(
-        places,
+        labels,
         np.stack([columns[name] for name in _POSITION], axis=1),
         _COLUMNS[given[0]] if given else "",
         values,
         columns.get("t"),
         columns.get("feed"),
-        tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
+        tuple((k, event) for k, text in enumerate(events) for event in _split_events(text)),
         notes=notes,
     )
 
 
 # Columns without a unit → the unit that is taken, and the ending for another one.
-_TAKEN = {
+_DEFAULT_UNITS = {
+    "t": ("seconds", ""),
     **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
     "feed": ("m/s", "feed_mm"),
     **dict.fromkeys(("roll", "pitch", "yaw"), ("radians about fixed axes", "roll_deg")),
-    **dict.fromkeys(_TURN, ("radians", "rx_deg")),
+    **dict.fromkeys(_ROTATION_VECTOR, ("radians", "rx_deg")),
 }
 
 
-def _unsaid(titles: Sequence[str]) -> tuple[str, ...]:
+def _units_note(titles: Sequence[str]) -> tuple[str, ...]:
     """Return a note of columns that say no unit, and of what they are taken for."""
     bare: dict[tuple[str, str], list[str]] = {}
     for title in titles:
-        if named(title) in _TAKEN:
-            bare.setdefault(_TAKEN[named(title)], []).append(named(title))
+        if column_name(title) in _DEFAULT_UNITS:
+            bare.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(column_name(title))
     if not bare:
         return ()
     columns = "; ".join(
-        f"{','.join(names)} for {taken} (else: {others})" for (taken, others), names in bare.items()
+        f"{','.join(names)} for {taken}{f' (else: {others})' if others else ''}"
+        for (taken, others), names in bare.items()
     )
     return (f"columns say no unit and are taken so: {columns}",)
 
 
-def _of_kuka(titles: Sequence[str]) -> list[str]:
+def _kuka_titles(titles: Sequence[str]) -> list[str]:
     """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
-    given = [named(title) for title in titles]
-    return [_KUKA.get(name, name) for name in given] if {"a", "b", "c"} <= set(given) else [*titles]
+    given = [column_name(title) for title in titles]
+    return (
+        [_KUKA_TITLES.get(name, name) for name in given]
+        if {"a", "b", "c"} <= set(given)
+        else [*titles]
+    )
 
 
 def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
     """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
-    bare = [k for k, title in enumerate(titles) if named(title) in _POSITION]
-    if bare and len(table) and np.abs(table[:, bare]).max() < _METRES:
+    bare = [k for k, title in enumerate(titles) if column_name(title) in _POSITION]
+    if bare and len(table) and np.abs(table[:, bare]).max() < _MAX_METRES:
         raise FileFormatError(
             f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
-            f"{_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
+            f"{_MAX_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
             f"yaw_deg,pitch_deg,roll_deg"
         )
 
 
-def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
+def _check_rotation_vectors(
+    file: FilePath, turns: Array, labels: Sequence[str], angles: str
+) -> None:
     """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
     sizes = np.linalg.norm(turns, axis=1)
     # Degrees that are taken for radians are reported as such later on.
@@ -375,31 +392,31 @@ def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: st
     if over.any():
         k = int(np.argmax(over))
         raise FileFormatError(
-            f"{file}: {places[k]}: rx,ry,rz is an axis times an angle of "
+            f"{file}: {labels[k]}: rx,ry,rz is an axis times an angle of "
             f"{np.degrees(sizes[k]):.7g}°, more than half a turn; are these angles about fixed "
             f"axes? Call them {angles}; of a rotation vector take the shorter turn, the other way "
             f"round"
         )
 
 
-def named(title: str) -> str:
+def column_name(title: str) -> str:
     """Return a title as its column is called here: x_mm of "X [mm]"."""
     name = title.strip().lower()
-    found = _TITLE.fullmatch(name)
+    found = _TITLE_WITH_UNIT.fullmatch(name)
     if found and found[2].strip() in _BRACKETS:
         name = found[1] + _BRACKETS[found[2].strip()]
     stem, unit = name, ""
     for suffix in _UNITS:
         if name.endswith(suffix):
             stem, unit = name.removesuffix(suffix), suffix
-    if place := _PLACES.fullmatch(stem):
-        stem = place[1] or place[2]
-    elif turn := _TURNS.fullmatch(stem):
+    if position := _POSITION_TITLES.fullmatch(stem):
+        stem = position[1] or position[2]
+    elif turn := _QUATERNION_TITLES.fullmatch(stem):
         stem = f"q{turn[1]}"
-    return _ALSO.get(stem, stem) + unit
+    return _SYNONYMS.get(stem, stem) + unit
 
 
-def _several(text: str) -> list[str]:
+def _split_events(text: str) -> list[str]:
     """Return the events of a row, with semicolons between them."""
     return [event.strip() for event in text.split(";") if event.strip()]
 
@@ -408,16 +425,16 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
     """Return the columns in SI units, by their names without unit."""
     columns: dict[str, Array] = {}
     for k, title in enumerate(header):
-        name, scale = _meant(file, title)
+        name, scale = _si_column(file, title)
         if name in columns:
             raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
         columns[name] = scale * table[:, k]
     return columns
 
 
-def _meant(file: FilePath, title: str) -> tuple[str, float]:
+def _si_column(file: FilePath, title: str) -> tuple[str, float]:
     """Return the name of a column without its unit, and that in SI units."""
-    title = named(title)
+    title = column_name(title)
     name, scale = title, 1.0
     for suffix, (names, factor) in _UNITS.items():
         if title.endswith(suffix) and title.removesuffix(suffix) in names:
@@ -428,17 +445,18 @@ def _meant(file: FilePath, title: str) -> tuple[str, float]:
             f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
             f"they point out"
         )
-    if _CODE.match(title):
+    if _GCODE_WORD.match(title):
         raise FileFormatError(
             f"{file}: unknown column '{title}': if this is G-code, call the file .nc or .gcode"
         )
-    if name in _MAKERS:
-        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS[name]}")
+    if name in _MAKERS_TITLES:
+        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS_TITLES[name]}")
     if name not in _KNOWN:
         raise FileFormatError(
-            f"{file}: unknown column '{title}'{nearest(title, (*_LONG, SEAM, EVENT))}, expected t, "
-            f"feed, seam, event, x,y,z and {' or '.join(','.join(names) for names in _COLUMNS)}; "
-            f"to leave a column out, call it - in columns (--columns -,x,y,z)"
+            f"{file}: unknown column '{title}'{nearest(title, (*_HINTED, SEAM, EVENT))}, expected "
+            f"t, feed, seam, event, x,y,z and "
+            f"{' or '.join(','.join(names) for names in _COLUMNS)}; to leave a column out, "
+            f"call it - in columns (--columns -,x,y,z)"
         )
     return name, scale
 
@@ -447,9 +465,11 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
     (array,) = read_arrays(file).values()
     if array.dtype.kind not in "iuf":
         raise FileFormatError(f"{file}: holds no array of numbers")
-    places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
+    labels = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return PoseRows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
+        rotations = array[:, :3, :3] * 1.0
+        rows = PoseRows(labels, array[:, :3, 3] * 1.0, "rotation", rotations, None)
+        return replace(rows, notes=(MATRIX_NOTE,))
     if array.ndim != 2:
         raise FileFormatError(
             f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or a table (N, C)"
@@ -462,14 +482,18 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
             f"give columns ('{before}x,y,z,qw,qx,qy,qz' or '{before}x,y,z,qx,qy,qz,qw')"
         )
     if columns is None or len(columns) != array.shape[1]:
-        named = "no columns" if columns is None else f"{len(columns)} columns"
+        count = "no columns" if columns is None else f"{len(columns)} columns"
         raise FileFormatError(
-            f"{file}: has shape {array.shape} and {named} are named, expected (N, 4, 4) poses, "
+            f"{file}: has shape {array.shape} and {count} are named, expected (N, 4, 4) poses, "
             f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
         )
     chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
     numbers = array[:, chosen] * 1.0
-    return rows_of_table(file, [columns[k] for k in chosen], numbers, places, {})
+    return rows_of_table(file, [columns[k] for k in chosen], numbers, labels, {})
+
+
+# Note on 4 x 4 matrices, which say no unit.
+MATRIX_NOTE = "matrices say no unit: their last columns are taken for metres"
 
 
 # Names of a list of messages.
@@ -486,7 +510,7 @@ def _read_ros(file: FilePath) -> dict[str, PoseRows]:
             f"{file}: holds no message with poses, expected a nav_msgs/Path or "
             f"geometry_msgs/PoseArray, or a list of these"
         )
-    notes = _frames(file, messages)
+    notes = _frame_notes(file, messages)
     if len(messages) == 1:
         return {"": replace(_of_message(file, messages[0], ""), notes=notes)}
     return {
@@ -495,7 +519,7 @@ def _read_ros(file: FilePath) -> dict[str, PoseRows]:
     }
 
 
-def _frames(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
+def _frame_notes(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
     """Return a note of the frame that messages name, which is not looked up.
 
     Raises
@@ -518,6 +542,8 @@ def _frames(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
             f"{file}: has poses in frame '{first}' and in '{second}', expected one: transform them "
             f"into the same, whose place is told by a frame (--frame)"
         )
+    if not frames:
+        return ("ROS: poses in metres, in no frame that is named",)
     return tuple(
         f"ROS: poses in metres in frame '{name}', which is taken for the root of the arm, or for "
         f"what frame (--frame) says"
@@ -549,16 +575,16 @@ def _of_message(file: FilePath, message: Any, where: str) -> PoseRows:
             f"or geometry_msgs/PoseArray, or poses in a list or by names (waypoints), each with "
             f"position and orientation or x, y, z"
         )
-    places = [f"{where}poses[{k}]" for k in range(len(poses))]
-    rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
-    stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    labels = [f"{where}poses[{k}]" for k in range(len(poses))]
+    rows = [_ros_pose(file, label, pose) for label, pose in zip(labels, poses, strict=True)]
+    stamps = [_stamp(file, label, pose) for label, pose in zip(labels, poses, strict=True)]
     # Publishers that know no times leave all stamps at the same one.
     t = None if len(set(stamps)) == 1 else np.array(stamps, dtype=np.float64) - (stamps[0] or 0.0)
     table = np.array(rows)
-    return PoseRows(places, table[:, :3], "quaternion", table[:, 3:], t)
+    return PoseRows(labels, table[:, :3], "quaternion", table[:, 3:], t)
 
 
-def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
+def _ros_pose(file: FilePath, label: str, given: Any) -> list[float]:
     pose = given.get("pose", given) if isinstance(given, Mapping) else given
     found = []
     for part, keys in (("position", "xyz"), ("orientation", "wxyz")):
@@ -567,12 +593,12 @@ def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
                 found.append(float(pose[part][key]))
             except (KeyError, OverflowError, TypeError, ValueError):
                 raise FileFormatError(
-                    f"{file}: {place}: {part}.{key} is missing or no number"
+                    f"{file}: {label}: {part}.{key} is missing or no number"
                 ) from None
     return found
 
 
-def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None:
+def _stamp(file: FilePath, label: str, given: Mapping[str, Any]) -> float | None:
     header = given.get("header")
     if header is None:
         return None
@@ -580,7 +606,7 @@ def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None
         return 1e-9 * nanoseconds(header["stamp"])
     except (KeyError, OverflowError, TypeError, ValueError):
         raise FileFormatError(
-            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec (ROS 1: secs "
+            f"{file}: {label}: header.stamp is incomplete, expected sec and nanosec (ROS 1: secs "
             f"and nsecs)"
         ) from None
 

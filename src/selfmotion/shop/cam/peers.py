@@ -36,7 +36,7 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
         with file.open("rb") as stream:
             head = stream.read(_HEAD)
             first = next((line for line in lines_of(text_of(file, head)) if line.strip()), "")
-            titles = [title.strip().lower() for title in first.split(",")]
+            titles = _cells(first.lower())
             read = _reader_of(first, titles)
             content = b"" if read is None else head + stream.read(_BYTES)
         if read is None or len(content) > _BYTES:
@@ -45,6 +45,11 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
     except (OSError, FileFormatError):
         return None
     return {"": read(file, text, titles)}
+
+
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line of a table, which semicolons or commas are between."""
+    return [cell.strip() for cell in line.split(";" if ";" in line else ",")]
 
 
 def _reader_of(
@@ -113,10 +118,10 @@ _IRBCAM = ("x", "y", "z", "rz1", "ry", "rz2")
 def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     from scipy.spatial.transform import Rotation
 
-    rows, places, feeds = list[list[float]](), list[str](), list[float]()
+    rows, labels, feeds = list[list[float]](), list[str](), list[float]()
     lines, middles = list[int](), list[int]()
     for number, line in enumerate(lines_of(text), 1):
-        cells = [cell.strip() for cell in line.split(",")]
+        cells = _cells(line)
         if not line.strip() or [cell.lower() for cell in cells] == list(titles):
             continue
         if len(cells) != len(titles):
@@ -138,10 +143,10 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
         lines.append(number)
         rows.append([values[key] for key in _IRBCAM])
         feeds.append(_MM * _number(file, number, found.get("velocity", "0")))
-        places.append(f"line {number}")
+        labels.append(f"line {number}")
     if middles[-1:] == [len(rows) - 1]:
         raise FileFormatError(
-            f"{file}: {places[-1]}: motion_type 1 is the middle of an arc of IRBCAM, whose end is "
+            f"{file}: {labels[-1]}: motion_type 1 is the middle of an arc of IRBCAM, whose end is "
             f"missing"
         )
     table = np.array(rows).reshape(-1, 6)
@@ -155,17 +160,17 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     positions = _MM * table[:, :3]
     if middles:
         chosen, positions, turns = _with_arcs(file, lines, middles, positions, turns)
-        places, feeds = [places[k] for k in chosen], [feeds[k] for k in chosen]
+        labels, feeds = [labels[k] for k in chosen], [feeds[k] for k in chosen]
     # A velocity is that of the step to its row; -1 is a rapid.
     to_next = np.array([*feeds[1:], *feeds[-1:]])
-    return _straight(places, positions, "rotation", turns, to_next, note)
+    return _straight(labels, positions, "rotation", turns, to_next, note)
 
 
 def _with_arcs(
     file: FilePath, lines: Sequence[int], middles: Sequence[int], positions: Array, turns: Array
 ) -> tuple[list[int], Array, Array]:
     """Return poses with arcs as chords, and which row each is of."""
-    chosen, places, found = [0], [positions[:1]], [turns[:1]]
+    chosen, points_of_steps, found = [0], [positions[:1]], [turns[:1]]
     for k in range(1, len(positions)):
         steps = [positions[k : k + 1]]
         if k in middles:
@@ -174,13 +179,13 @@ def _with_arcs(
             continue
         for row, points in enumerate(steps, k):
             chosen += [row] * len(points)
-            places.append(points)
+            points_of_steps.append(points)
             found.append(_turning(turns[row - 1], turns[row], len(points)))
-    return chosen, np.concatenate(places), np.concatenate(found)
+    return chosen, np.concatenate(points_of_steps), np.concatenate(found)
 
 
 def _straight(
-    places: Sequence[str],
+    labels: Sequence[str],
     positions: Array,
     orientation: str,
     values: Array,
@@ -191,7 +196,7 @@ def _straight(
     rapid = None if feeds is None or not (feeds < 0.0).any() else feeds < 0.0
     known = feeds is not None and bool((feeds[:-1] != 0.0).all())
     return PoseRows(
-        places,
+        labels,
         positions,
         orientation,
         values,
@@ -207,13 +212,13 @@ def _straight(
 # igus (Commonplace Robotics): X, Y, Z [mm] and A, B, C, of which only places are read.
 
 _IGUS = re.compile(
-    r"X\s*[-+.\dE]+\s*;\s*Y\s*[-+.\dE]+\s*;\s*Z\s*[-+.\dE]+\s*(?:;.*)?", re.IGNORECASE
+    r"X\s*[-+.,\dE]+\s*;\s*Y\s*[-+.,\dE]+\s*;\s*Z\s*[-+.,\dE]+\s*(?:;.*)?", re.IGNORECASE
 )
-_WORD = re.compile(r"\s*([XYZ])\s*([-+.\dE]{1,40})\s*", re.IGNORECASE)
+_WORD = re.compile(r"\s*([XYZ])\s*([-+.,\dE]{1,40})\s*", re.IGNORECASE)
 
 
 def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
-    rows, places = list[list[float]](), list[str]()
+    rows, labels = list[list[float]](), list[str]()
     for number, line in enumerate(lines_of(text), 1):
         if not line.strip():
             continue
@@ -223,15 +228,16 @@ def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
                 f"B …; C … as igus' programs write them"
             )
         words = filter(None, map(_WORD.fullmatch, line.split(";")))
-        said = {found[1].upper(): found[2] for found in words}
+        # Some computers write decimal commas.
+        said = {found[1].upper(): found[2].replace(",", ".") for found in words}
         rows.append([_number(file, number, said.get(key, "")) for key in "XYZ"])
-        places.append(f"line {number}")
+        labels.append(f"line {number}")
     note = (
         "igus: X, Y, Z in mm; A, B, C are passed over, as the form does not say about which axes "
         "they turn in which order: for orientations write a table with columns qw,qx,qy,qz or "
         "roll_deg,pitch_deg,yaw_deg"
     )
-    return _straight(places, _MM * np.array(rows), "", np.zeros((len(rows), 0)), None, note)
+    return _straight(labels, _MM * np.array(rows), "", np.zeros((len(rows), 0)), None, note)
 
 
 # Motion primitives of research code: breakpoints,primitives,points,q_bp, with arrays as texts.
@@ -245,10 +251,11 @@ _ARRAY = re.compile(r"array\(\s*\[([^\]]*)\]\s*\)")
 def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
     reader = csv.DictReader(io.StringIO(text))
     try:
+        reader.fieldnames = [name.strip().lower() for name in reader.fieldnames or ()]
         listed = [(reader.line_num, found) for found in reader]
     except csv.Error as error:
         raise FileFormatError(f"{file}: line {reader.line_num}: is no table: {error}") from error
-    rows, places = list[Array](), list[str]()
+    rows, labels = list[Array](), list[str]()
     for where, found in listed:
         kind, points = str(found.get("primitives")), _ARRAY.findall(str(found.get("points")))
         expected = next((n for name, n in _POINTS.items() if kind.lower().startswith(name)), 0)
@@ -264,18 +271,22 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
         ends = _MM * np.array(given)
         added = ends if expected == 1 else np.concatenate(_arc(file, where, rows[-1], *ends))
         rows += list(added)
-        places += [f"line {where}"] * len(added)
+        labels += [f"line {where}"] * len(added)
     note = (
         "motion primitives: points in mm, joined by straight lines (movej too), and by arcs for "
         "movec; q_bp is passed over"
     )
     positions = np.array(rows).reshape(-1, 3)
-    return _straight(places, positions, "", np.zeros((len(rows), 0)), None, note)
+    return _straight(labels, positions, "", np.zeros((len(rows), 0)), None, note)
 
 
 # compas: frames by a point, an x axis and a y axis; print points of compas_slicer around them.
 
 _FRAME = ("point", "xaxis", "yaxis")
+# Names of a list of frames.
+_LISTS = ("frames", "data")
+# Keys of a list of frames that move nothing.
+_NAMES = ("dtype", "guid", "name")
 _SQUARE = 1e-3
 
 
@@ -287,15 +298,23 @@ def compas_poses(file: FilePath, document: Any) -> Mapping[str, PoseRows] | None
     FileFormatError
         A frame is not one; it is named.
     """
-    if isinstance(document, list) and document and all(map(_is_frame, document)):
-        frames = [_inner(item) for item in document]
-        places = [f"[{k}]" for k in range(len(frames))]
-        positions, turns = _frames(file, places, frames)
+    table = document if isinstance(document, Mapping) else {"": document}
+    key = next((name for name in ("", *_LISTS) if _are_frames(table.get(name))), None)
+    if key is not None:
+        frames = [_inner(item) for item in table[key]]
+        labels = [f"{key}[{k}]" for k in range(len(frames))]
+        positions, turns = _frames(file, labels, frames)
         note = "compas: points in metres, as compas_fab has them"
-        return {"": _straight(places, positions, "rotation", turns, None, note)}
+        others = [f"'{name}'" for name in table if name not in (key, *_NAMES)]
+        note += f"; passed over: {', '.join(others)}" if others else ""
+        return {"": _straight(labels, positions, "rotation", turns, None, note)}
     if isinstance(document, Mapping) and document and all(map(_is_layer, document.values())):
         return _print_points(file, document)
     return None
+
+
+def _are_frames(listed: Any) -> bool:
+    return isinstance(listed, list) and bool(listed) and all(map(_is_frame, listed))
 
 
 def _inner(item: Any) -> Any:
@@ -323,18 +342,18 @@ def _is_layer(item: Any) -> bool:
 
 
 def _frames(
-    file: FilePath, places: Sequence[str], frames: Sequence[Mapping[str, Any]]
+    file: FilePath, labels: Sequence[str], frames: Sequence[Mapping[str, Any]]
 ) -> tuple[Array, Array]:
     positions, turns = [], []
-    for place, frame in zip(places, frames, strict=True):
+    for label, frame in zip(labels, frames, strict=True):
         for key in _FRAME:
             value = frame[key]
             if not (isinstance(value, list) and len(value) == 3 and all(map(is_number, value))):
-                raise FileFormatError(f"{file}: {place}: {key} is no list of three numbers")
+                raise FileFormatError(f"{file}: {label}: {key} is no list of three numbers")
         x, y = (np.array(frame[key], dtype=np.float64) for key in _FRAME[1:])
         lengths = float(np.linalg.norm(x)), float(np.linalg.norm(y))
         if min(lengths) < _SQUARE or abs(x @ y) > _SQUARE * lengths[0] * lengths[1]:
-            raise FileFormatError(f"{file}: {place}: xaxis and yaxis are no two axes of a frame")
+            raise FileFormatError(f"{file}: {label}: xaxis and yaxis are no two axes of a frame")
         x = x / lengths[0]
         y = y - (y @ x) * x
         y = y / np.linalg.norm(y)
@@ -349,9 +368,9 @@ def _print_points(file: FilePath, document: Mapping[str, Any]) -> Mapping[str, P
     for layer, paths in document.items():
         for path, points in paths.items():
             items, name = list(points.values()), f"{layer} {path}"
-            places = [f"{layer}.{path}.{key}" for key in points]
+            labels = [f"{layer}.{path}.{key}" for key in points]
             frames = [_inner(item["frame"]) for item in items]
-            positions, turns = _frames(file, places, frames)
+            positions, turns = _frames(file, labels, frames)
             feeds = np.array([
                 _MM * float(item["velocity"]) if is_number(item.get("velocity")) else 0.0
                 for item in items
@@ -362,7 +381,7 @@ def _print_points(file: FilePath, document: Mapping[str, Any]) -> Mapping[str, P
                 part = slice(first, last + 1)
                 whole = first == 0 and last == len(items) - 1
                 found[name if whole else f"{name} {number}"] = _straight(
-                    places[part], _MM * positions[part], "rotation", turns[part], feeds[part], note
+                    labels[part], _MM * positions[part], "rotation", turns[part], feeds[part], note
                 )
     if not found:
         raise FileFormatError(f"{file}: nothing of it extrudes (extruder_toggle)")

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import FileFormatError, is_number, read_values, shown
-from selfmotion.shop.cam.path_rows import READERS, PoseRows, Reading, named, rows_of_table
+from selfmotion.shop.cam.path_rows import (
+    MATRIX_NOTE,
+    READERS,
+    PoseRows,
+    Reading,
+    column_name,
+    rows_of_table,
+)
 from selfmotion.shop.cam.peers import compas_poses
 
 # Names of lists of poses.
@@ -31,7 +38,7 @@ _ORDERS = {
 }
 _TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
 # Largest number of keys that a note names.
-_LISTED = 6
+_MAX_LISTED = 6
 _WRITTEN = (".yaml", ".yml", ".json")
 # Keys that move nothing.
 _NAMES = frozenset(
@@ -58,33 +65,44 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     if found is None:
         return READERS[file.suffix.lower()](file, reading)
     notes = _passed_over(file, "beside the poses", beside)
-    places, items = [place for place, _ in found], [item for _, item in found]
+    labels, items = [label for label, _ in found], [item for _, item in found]
     if all(_is_matrix(item) for item in items):
-        matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
-                             for place, item in found])  # fmt: skip
-        rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
-        return {"": replace(rows, notes=notes)}
-    for place, item in found:
+        matrices = np.array([[[_number(file, label, value) for value in row] for row in item]
+                             for label, item in found])  # fmt: skip
+        rows = PoseRows(labels, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
+        return {"": replace(rows, notes=(MATRIX_NOTE, *notes))}
+    for label, item in found:
         if not isinstance(item, Mapping):
-            raise FileFormatError(f"{file}: {place}: is a matrix among poses of another form")
+            raise FileFormatError(f"{file}: {label}: is a matrix among poses of another form")
         inner = item.get("pose")
         unread = [_unread(item), _unread(inner) if isinstance(inner, Mapping) else {}]
         notes += _passed_over(
-            file, place, {key: item for each in unread for key, item in each.items()}
+            file, label, {key: item for each in unread for key, item in each.items()}
         )
-    flat = [dict(_numbers_of(file, place, item)) for place, item in found]
-    for place, row in zip(places, flat, strict=True):
+        notes += _angles_beside(label, item)
+    flat = [dict(_numbers_of(file, label, item)) for label, item in found]
+    for label, row in zip(labels, flat, strict=True):
         if set(row) != set(flat[0]):
             odd = sorted(set(row) ^ set(flat[0]))[0]
             raise FileFormatError(
-                f"{file}: {place}: '{odd}' is in some poses only, expected the same of all"
+                f"{file}: {label}: '{odd}' is in some poses only, expected the same of all"
             )
     header = list(flat[0])
     table = np.array([[row[name] for name in header] for row in flat])
-    rows = rows_of_table(file, header, table, places, {})
+    rows = rows_of_table(file, header, table, labels, {})
     # A note on keys that every pose has names the first pose.
     first = {note.partition(": ")[2]: note for note in reversed(notes)}
     return {"": replace(rows, notes=(*rows.notes, *reversed(first.values())))}
+
+
+def _angles_beside(label: str, item: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note of angles that stand beside a quaternion, which is what is read."""
+    inner = item.get("pose")
+    given = {*item, *(inner if isinstance(inner, Mapping) else ())}
+    angles, turns = given.intersection(_ANGLES), given.intersection(_QUATERNIONS)
+    if not (angles and turns):
+        return ()
+    return (f"{label}: '{min(angles)}' is passed over beside '{min(turns)}'",)
 
 
 def _unread(item: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,7 +133,7 @@ def _passed_over(file: FilePath, where: str, values: Mapping[str, Any]) -> tuple
                 f"it"
             )
     others = [f"'{key}'" for key in values if key not in _NAMES]
-    return (f"{where}: passed over: {', '.join(others[:_LISTED])}",) if others else ()
+    return (f"{where}: passed over: {', '.join(others[:_MAX_LISTED])}",) if others else ()
 
 
 READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
@@ -172,7 +190,7 @@ def _is_matrix(item: Any) -> bool:
     )
 
 
-def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+def _numbers_of(file: FilePath, label: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a pose by what columns of a table are called.
 
     Texts are passed over, and tables of anything else, such as joints, with a note; of two
@@ -181,17 +199,17 @@ def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator
     turned = any(key in item for key in _QUATERNIONS)
     for key, value in item.items():
         if key == "pose" and isinstance(value, Mapping):
-            yield from _numbers_of(file, place, value)
+            yield from _numbers_of(file, label, value)
         elif turned and key in _ANGLES:
             continue
         elif isinstance(value, Mapping):
             stem = "" if key in _ANGLES else f"{key}."
             for name, number in value.items() if key in _TABLES else ():
-                yield named(f"{stem}{name}"), _number(file, f"{place}: {key}.{name}", number)
+                yield column_name(f"{stem}{name}"), _number(file, f"{label}: {key}.{name}", number)
         elif isinstance(value, list):
-            yield from _listed(file, f"{place}: {key}", str(key), value)
+            yield from _listed(file, f"{label}: {key}", str(key), value)
         elif is_number(value):
-            yield named(str(key)), _number(file, f"{place}: {key}", value)
+            yield column_name(str(key)), _number(file, f"{label}: {key}", value)
 
 
 def _listed(

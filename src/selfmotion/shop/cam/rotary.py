@@ -21,7 +21,7 @@ _CHORDS = 100_000
 
 @dataclass(frozen=True)
 class Rotary:
-    """Which axes turn what.
+    """Rotary axes of a machine, and whether they turn the head or a table.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ _ALONG = 1e-3
 _HALF = 0.5 * np.pi
 
 
-class Stretch(NamedTuple):
+class PathSection(NamedTuple):
     """Poses between two corners: their numbers, first to last, and their rotations (K, 3, 3)."""
 
     first: int
@@ -27,7 +27,7 @@ class Stretch(NamedTuple):
 
 def sections_along(
     positions: Array, axes: Array, rapid: Flags, along: str, lean: tuple[float, float], bend: float
-) -> list[Stretch]:
+) -> list[PathSection]:
     """Return the sections of a path between corners, the tool's axis along it on each.
 
     In bends the direction is halfway between that of both legs.
@@ -71,7 +71,7 @@ def sections_along(
     for first, last in pairwise([0, *corners.tolist(), len(positions) - 1]):
         own = units[first:last]
         ahead = np.concatenate([own[:1], own[:-1] + own[1:], own[-1:]])
-        found.append(Stretch(first, last, _facing(ahead, axes[first : last + 1], along, lean)))
+        found.append(PathSection(first, last, _facing(ahead, axes[first : last + 1], along, lean)))
     return found
 
 

@@ -3,15 +3,15 @@
 from selfmotion.shop.controllers.controller_program import ControllerProgram as ControllerProgram
 from selfmotion.shop.controllers.judged_programs import (
     as_shifted as as_shifted,
+    controller_note as controller_note,
+    differing_facts as differing_facts,
     judged_interpolations as judged_interpolations,
     judged_motion as judged_motion,
     judged_program as judged_program,
-    misswitched as misswitched,
-    of_the_controller as of_the_controller,
     part_of as part_of,
     shift_note as shift_note,
     stated_deviation as stated_deviation,
-    unlike as unlike,
+    switching_faults as switching_faults,
 )
 from selfmotion.shop.controllers.motion_tables import (
     followers as followers,
@@ -22,6 +22,7 @@ from selfmotion.shop.controllers.motions import (
     MESSAGES as MESSAGES,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
+    motion_notes as motion_notes,
     motion_of_program as motion_of_program,
     read_motion as read_motion,
     read_parts as read_parts,
@@ -37,7 +38,7 @@ from selfmotion.shop.controllers.program_files import (
     PROGRAMS as PROGRAMS,
     READ_PROGRAMS as READ_PROGRAMS,
     keeps_stated as keeps_stated,
-    program_miss as program_miss,
+    program_deviation as program_deviation,
     read_program as read_program,
 )
 from selfmotion.shop.controllers.program_settings import (
@@ -45,14 +46,15 @@ from selfmotion.shop.controllers.program_settings import (
     read_program_settings as read_program_settings,
 )
 from selfmotion.shop.controllers.samples import (
-    LinearMiss as LinearMiss,
+    LinearDeviation as LinearDeviation,
     coarsest_rate as coarsest_rate,
-    linear_miss as linear_miss,
+    linear_deviation as linear_deviation,
     moving_ends as moving_ends,
+    slowed_as as slowed_as,
     within_limits_at as within_limits_at,
 )
 from selfmotion.shop.controllers.thinning import (
     by_targets as by_targets,
-    what_lines_keep as what_lines_keep,
+    constraints_of_lines as constraints_of_lines,
 )
 from selfmotion.shop.controllers.tool_frames import turned_base as turned_base

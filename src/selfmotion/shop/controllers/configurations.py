@@ -30,7 +30,7 @@ _BENT = 0.5
 
 
 class Sides(NamedTuple):
-    """How an arm stands: wrist in front of axis 1, bent beyond the stretched arm; and at zero."""
+    """Configuration of an arm: wrist in front of axis 1, elbow bent; and the same at zero."""
 
     front: bool
     bent: bool

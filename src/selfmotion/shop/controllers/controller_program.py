@@ -16,12 +16,12 @@ from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
 from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.segments import (
-    NO_MISS,
+    NO_DEVIATION,
+    Deviations,
     Knots,
-    Misses,
     Segment,
     by_interpolation,
-    miss_of,
+    deviation_of,
 )
 from selfmotion.shop.controllers.thinning import operations_of
 from selfmotion.shop.controllers.tool_frames import WORLD
@@ -58,7 +58,7 @@ class ControllerProgram:
         In the order of the file: A1 … A6, E1 … E6.
     segments : tuple of Segment
         From rest to rest, coordinates in the order of the axes.
-    miss : Misses
+    deviation : Deviations
         How far targets are off the motion, as the file states it.
     switches : tuple of Switch
         What is switched when, in order.
@@ -85,7 +85,7 @@ class ControllerProgram:
     name: str
     axes: tuple[Axis, ...]
     segments: tuple[Segment, ...]
-    miss: Misses
+    deviation: Deviations
     switches: tuple[Switch, ...] = ()
     shift: SE3 | None = None
     carrier: str = WORLD
@@ -98,11 +98,11 @@ class ControllerProgram:
 
     @property
     def targets(self) -> int:
-        """How many targets it has."""
+        """Number of targets."""
         return sum(len(segment.t) - 1 for segment in self.segments if not segment.is_rest)
 
     @property
-    def begins_elsewhere(self) -> str:
+    def start_fault(self) -> str:
         """Reason why the axis target at its begin does not fit its first pose; empty for none.
 
         Of a shifted work object the motion to the shifted begin is to be expected.
@@ -159,7 +159,7 @@ class ControllerProgram:
         names = tuple(axis.joint for axis in self.axes)
         return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
 
-    def miss_of(self, plan: Plan | Parts | Move | Program) -> Misses:
+    def deviation_of(self, plan: Plan | Parts | Move | Program) -> Deviations:
         """Return how far it is off the motion of a plan, parts, a move or a program.
 
         Raises
@@ -173,7 +173,7 @@ class ControllerProgram:
         if sorted(names) != sorted(known):
             raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
         order = [names.index(name) for name in known]
-        worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
+        worst, at, k = Deviations(NO_DEVIATION, NO_DEVIATION), 0.0, 0
         for number, segment in enumerate(self.segments):
             if segment.is_slow and self.shift is None:
                 after = self.segments[min(number + 1, len(self.segments) - 1)].name
@@ -183,8 +183,14 @@ class ControllerProgram:
                 )
             same = segment.in_order(order)
             operation = operations[min(k, len(operations) - 1)]
-            found = miss_of(same, operation.motion, operation.chains, operation.motion.t[0] + at)
-            both = Misses(NO_MISS, found) if operation.is_move else Misses(found, NO_MISS)
+            found = deviation_of(
+                same, operation.motion, operation.chains, operation.motion.t[0] + at
+            )
+            both = (
+                Deviations(NO_DEVIATION, found)
+                if operation.is_move
+                else Deviations(found, NO_DEVIATION)
+            )
             worst = worst.worse(both)
             at += segment.duration
             if at >= operation.motion.duration - _MOMENT:

@@ -26,7 +26,7 @@ _FEWEST = 1600
 
 
 @dataclass(frozen=True, eq=False)
-class PassedLength:
+class ArcLength:
     """The length that a tool has passed, at times.
 
     Attributes
@@ -46,7 +46,7 @@ class PassedLength:
     @classmethod
     def of_motion(
         cls, frames: ToolFrames, motion: Trajectory, first: float, last: float
-    ) -> "PassedLength":
+    ) -> "ArcLength":
         """Return that of a joint motion, in the work object, from one time to another [s]."""
 
         def speeds(times: Array) -> Array:
@@ -56,7 +56,7 @@ class PassedLength:
         return cls._integrated(speeds, motion.t, first, last)
 
     @classmethod
-    def of_path(cls, path: Path, first: float, last: float) -> "PassedLength":
+    def of_path(cls, path: Path, first: float, last: float) -> "ArcLength":
         """Return that of a path, in its own frame."""
 
         def speeds(times: Array) -> Array:
@@ -68,7 +68,7 @@ class PassedLength:
     @classmethod
     def _integrated(
         cls, speeds: Callable[[Array], Array], marks: Array, first: float, last: float
-    ) -> "PassedLength":
+    ) -> "ArcLength":
         """Return the integral of a speed by Simpson's rule."""
         inside = marks[(marks > first) & (marks < last)]
         marks = np.concatenate([[first], inside, [last]])
@@ -83,7 +83,7 @@ class PassedLength:
 
     @property
     def whole(self) -> float:
-        """How far it goes in all [m]."""
+        """Total arc length [m]."""
         return float(self.length[-1])
 
     def at(self, times: Array) -> Array:
@@ -142,7 +142,7 @@ class Ramps(NamedTuple):
 
     @property
     def each(self) -> float:
-        """How long each of them takes [s]."""
+        """Duration of each ramp [s]."""
         return min(self.seconds - self.whole, 0.5 * self.seconds)
 
     def passed(self, times: Array) -> Array:
@@ -193,7 +193,7 @@ class FeedSegment(PoseSegment):
 
     @property
     def ramps(self) -> Ramps:
-        """How it runs up and down where times are needed."""
+        """Ramps of the segment at its planned duration."""
         return Ramps(float(self.t[-1]), self.seconds)
 
     @cached_property
@@ -202,13 +202,13 @@ class FeedSegment(PoseSegment):
         t = 0.5 * (self.t[1:] + self.t[:-1])
         rows = self._stepped(t)
         q = self.joints(rows, t)
-        places = np.where(np.isfinite(self.vias), self.vias, rows[:, :3])
+        positions = np.where(np.isfinite(self.vias), self.vias, rows[:, :3])
         return PoseSegment(
             self.name,
             t,
             q,
-            places=places,
-            turns=rows[:, 3:7],
+            positions=positions,
+            quaternions=rows[:, 3:7],
             frames=self.frames,
             near=self.near,
             order=self.order,
@@ -220,8 +220,8 @@ class FeedSegment(PoseSegment):
 
     @cached_property
     def lengths(self) -> Array:
-        """How far the tool has gone at each target, (K + 1,) [m]."""
-        return np.append(0.0, np.cumsum(step_lengths(self.places, self.vias)))
+        """Arc length at each target, (K + 1,) [m]."""
+        return np.append(0.0, np.cumsum(step_lengths(self.positions, self.vias)))
 
     @override
     def evaluation_times(self) -> Array:
@@ -256,14 +256,18 @@ class FeedSegment(PoseSegment):
     @override
     def reference(self, motion: Trajectory, first: float) -> Array:
         """See `Segment.reference`: where the tool has gone as far."""
-        gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
-        shares = self._gone(self.evaluation_times()) / self.lengths[-1]
-        return motion(np.clip(gone.when(shares * gone.whole), motion.t[0], motion.t[-1]))
+        travel = ArcLength.of_motion(self.frames, motion, first, first + self.seconds)
+        shares = self._travel(self.evaluation_times()) / self.lengths[-1]
+        return motion(np.clip(travel.when(shares * travel.whole), motion.t[0], motion.t[-1]))
 
-    def at_pace(self, gone: PassedLength) -> Iterator[Knots]:
+    def at_pace(self, travel: ArcLength) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace at which something else has gone as far."""
-        own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
-        return self._driven(gone.t - gone.t[0], own)
+        own = np.interp(
+            travel.at(travel.t) * (self.lengths[-1] / travel.whole),
+            self.lengths,
+            self.t,
+        )
+        return self._driven(travel.t - travel.t[0], own)
 
     def along(self, path: Path, first: float) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace of a path that it begins at `first` [s].
@@ -273,30 +277,30 @@ class FeedSegment(PoseSegment):
         FileFormatError
             A speed is not that of the path.
         """
-        gone = PassedLength.of_path(path, first, first + self.seconds)
-        if gone.whole < _LEAST:
+        travel = ArcLength.of_path(path, first, first + self.seconds)
+        if travel.whole < _LEAST:
             raise FileFormatError(
                 f"'{self.name}' moves where the path rests: the program is of another one"
             )
-        ends = gone.when(self.lengths * (gone.whole / self.lengths[-1]))
+        ends = travel.when(self.lengths * (travel.whole / self.lengths[-1]))
         for k, (begin, end) in enumerate(pairwise(ends.tolist())):
-            self._check_speed(path, gone, float(self.speeds[k]), (begin, end))
-        return self.at_pace(gone)
+            self._check_speed(path, travel, float(self.speeds[k]), (begin, end))
+        return self.at_pace(travel)
 
     def _check_speed(
-        self, path: Path, gone: PassedLength, speed: float, during: tuple[float, float]
+        self, path: Path, travel: ArcLength, speed: float, during: tuple[float, float]
     ) -> None:
         """Refuse a speed that is faster than all of the path, or none of the feeds it asks for."""
-        here = (gone.t >= during[0]) & (gone.t <= during[1])
-        fastest, slowest = float(gone.speed[here].max(initial=0.0)), 0.0
+        here = (travel.t >= during[0]) & (travel.t <= during[1])
+        fastest, slowest = float(travel.speed[here].max(initial=0.0)), 0.0
         at = 0.5 * sum(during)
         # Where less of a step than this is at another feed, its zone is.
-        least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
+        least = min(ZONE, 0.4 * float(np.ptp(travel.at(np.array(during)))))
         feeds = [
             (feed, *np.clip(window, *during))
             for feed in path.feeds
             for window in feed.during
-            if np.ptp(gone.at(np.clip(window, *during))) > least
+            if np.ptp(travel.at(np.clip(window, *during))) > least
         ]
         for feed, first, last in feeds:
             fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
@@ -317,23 +321,23 @@ class FeedSegment(PoseSegment):
 
     def _stepped(self, times: Array) -> Array:
         rows = straight(times, self.t, self.rows)
-        put_on_arcs(rows, times, self.t, self.places, self.vias)
+        put_on_arcs(rows, times, self.t, self.positions, self.vias)
         return rows
 
     def _rounded(self, times: Array) -> Array:
         """Return rows at times where corners are cut as far from their targets as zones reach."""
         reach = np.minimum(0.5 * np.diff(self.lengths), ZONE)
         cuts = [self.lengths[1:-1] - reach[:-1], self.lengths[1:-1] + reach[1:]]
-        edges, gone = np.sort(np.concatenate(cuts)), self._gone(times)
+        edges, travel = np.sort(np.concatenate(cuts)), self._travel(times)
         # Between two cuts of one target it goes straight, else as it does.
         rows = self._stepped(times)
-        inside = np.searchsorted(edges, gone) % 2 == 1
+        inside = np.searchsorted(edges, travel) % 2 == 1
         if inside.any():
             at_edges = self._stepped(np.interp(edges, self.lengths, self.t))
-            rows[inside] = straight(gone[inside], edges, at_edges)
+            rows[inside] = straight(travel[inside], edges, at_edges)
         return rows
 
-    def _gone(self, times: Array) -> Array:
+    def _travel(self, times: Array) -> Array:
         """Return how far the tool has gone at times [m]: its path is the same at all speeds."""
         return np.interp(times, self.t, self.lengths)
 
@@ -342,11 +346,11 @@ class FeedSegment(PoseSegment):
         """See `Segment.spline`: over the length of the path."""
         from scipy.interpolate import CubicSpline
 
-        rows: Array = CubicSpline(self.lengths, self.rows)(self._gone(times))
+        rows: Array = CubicSpline(self.lengths, self.rows)(self._travel(times))
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
 
 
-def times_at(places: Array, vias: Array, speeds: Array | Sequence[float]) -> Array:
+def times_at(positions: Array, vias: Array, speeds: Array | Sequence[float]) -> Array:
     """Return when targets are reached at speeds (K,) without ramps, (K + 1,) [s]."""
-    return np.append(0.0, np.cumsum(step_lengths(places, vias) / np.asarray(speeds)))
+    return np.append(0.0, np.cumsum(step_lengths(positions, vias) / np.asarray(speeds)))

@@ -14,21 +14,21 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.shop.controllers.feed_segments import FeedSegment, PassedLength, times_at
+from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
 from selfmotion.shop.controllers.pose_numbers import Rounding
-from selfmotion.shop.controllers.program_texts import TIMED
+from selfmotion.shop.controllers.program_texts import TIMES_HEADING
 from selfmotion.shop.controllers.segments import (
-    SURE,
+    SAMPLING_FACTOR,
+    Deviation,
     Event,
     Knots,
-    Miss,
     Segment,
+    aligned_quaternions,
     by_interpolation,
-    on_one_side,
 )
 from selfmotion.shop.controllers.steps import (
     Allowed,
-    Places,
+    SampledPoses,
     Steps,
     StepSearch,
     arc_through,
@@ -68,7 +68,7 @@ _PROMPT = 5e-4
 class FeedSection(PoseSection):
     """Section of a seam at a feed between two rests, to be written as poses with speeds."""
 
-    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
         """See `Section.segments`: one from rest to rest of the tool, the arm's self-motion aside.
 
         With times where speeds do not do, and the segment says why.
@@ -77,15 +77,16 @@ class FeedSection(PoseSection):
             return super().segments(allowed)
         self.check_regular(allowed)
         parts = [replace(self, first=a, last=b) for a, b in pairwise(self._stops)]
-        gone = [part._gone for part in parts]
+        travel = [part._travel for part in parts]
         why, stuck = "there is no feed where the tool hardly moves", None
         for free, share in product(_FREE, _OF_PLACES):
-            if min(each.whole for each in gone) < _SHORT:
+            if min(each.whole for each in travel) < _SHORT:
                 break
             nearer = replace(allowed, position=share * allowed.position)
             turning = max(free, allowed.rotation)
             made = [
-                part._fewest(each, nearer, turning) for part, each in zip(parts, gone, strict=True)
+                part._fewest(each, nearer, turning)
+                for part, each in zip(parts, travel, strict=True)
             ]
             found = [segment for segment in made if isinstance(segment, FeedSegment)]
             if len(found) < len(parts):
@@ -99,19 +100,19 @@ class FeedSection(PoseSection):
             )
             if not all(part._is_prompt(own) for part, own in zip(parts, found, strict=True)):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
-            elif self._keeps(found, gone, allowed):
+            elif self._keeps(found, travel, allowed):
                 pairs = zip(parts, found, strict=True)
-                return [(segment, part._miss(segment)) for part, segment in pairs]
-        ((timed, miss),) = super().segments(allowed)
-        return [(replace(timed, remark=f"{TIMED}{why}"), miss)]
+                return [(segment, part._deviation(segment)) for part, segment in pairs]
+        ((timed, deviation),) = super().segments(allowed)
+        return [(replace(timed, remark=f"{TIMES_HEADING}{why}"), deviation)]
 
     def _lost(self, at: float, allowed: Tolerance) -> str:
         """Return in words where no poses at a feed keep the motion, and what would help."""
         motion = self.operation.motion
         tool = self.operation.chains[0].place(motion(at)).translation
-        place = ", ".join(f"{value:.3f}" for value in tool)
+        position = ", ".join(f"{value:.3f}" for value in tool)
         return (
-            f"near t = {at - motion.t[0]:.4g} s, at ({place}) m, no poses at its feed keep it "
+            f"near t = {at - motion.t[0]:.4g} s, at ({position}) m, no poses at its feed keep it "
             f"within {1e3 * allowed.position:.3g} mm and {np.degrees(allowed.rotation):.3g}°: in "
             f"corners round them more (tolerance = 0.002), or stop there (corners = 'stop'); else "
             f"allow more (deviation), or keep away from singular poses"
@@ -119,23 +120,23 @@ class FeedSection(PoseSection):
 
     @property
     def _stops(self) -> list[float]:
-        """When the tool rests, from the first to the last."""
+        """Times at which the tool rests, from first to last [s]."""
         at = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
         inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
         return [self.first, *inside.tolist(), self.last]
 
     @property
-    def _gone(self) -> PassedLength:
-        return PassedLength.of_motion(self.frames, self.operation.motion, self.first, self.last)
+    def _travel(self) -> ArcLength:
+        return ArcLength.of_motion(self.frames, self.operation.motion, self.first, self.last)
 
     def _keeps(
-        self, segments: Sequence[FeedSegment], gone: Sequence[PassedLength], allowed: Tolerance
+        self, segments: Sequence[FeedSegment], travel: Sequence[ArcLength], allowed: Tolerance
     ) -> bool:
         """Whether the seam keeps all that it has to with segments in place of its motion.
 
         By each interpolation that a controller may use.
         """
-        motions = (segment.at_pace(each) for segment, each in zip(segments, gone, strict=True))
+        motions = (segment.at_pace(each) for segment, each in zip(segments, travel, strict=True))
         return all(self._keeps_by(parts, allowed) for parts in by_interpolation(motions))
 
     def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
@@ -166,17 +167,17 @@ class FeedSection(PoseSection):
             for event, (at, _) in zip(segment.events, self.events, strict=True)
         )
 
-    def _fewest(self, gone: PassedLength, allowed: Tolerance, free: float) -> FeedSegment | float:
+    def _fewest(self, travel: ArcLength, allowed: Tolerance, free: float) -> FeedSegment | float:
         """Return the fewest targets; where none keep what is allowed, near when that is [s]."""
-        fixed = self._fixed(gone)
-        along = self._along(gone, fixed)
-        marks = [int(np.abs(along.gone - each).argmin()) for each in fixed]
+        fixed = self._fixed(travel)
+        along = self._along(travel, fixed)
+        marks = [int(np.abs(along.travel - each).argmin()) for each in fixed]
         limits = Allowed(allowed.position, allowed.rotation, free)
-        steps = StepSearch(self.frames, self.operation.turns, along, limits).between(marks)
+        steps = StepSearch(self.frames, self.operation.rotation_task, along, limits).between(marks)
         if not isinstance(steps, Steps):
-            return self._when(gone, along.gone[steps])
+            return self._when(travel, along.travel[steps])
         for _ in range(_TRIES):
-            segment = self._segment(gone, along, steps)
+            segment = self._segment(travel, along, steps)
             taken = self._off(segment, limits)
             if not isinstance(taken, np.ndarray):
                 return taken
@@ -188,67 +189,69 @@ class FeedSection(PoseSection):
             if len(finer.ends) == len(steps.ends):
                 break
             steps = finer
-        return self._when(gone, along.gone[worst])
+        return self._when(travel, along.travel[worst])
 
-    def _when(self, gone: PassedLength, far: float) -> float:
+    def _when(self, travel: ArcLength, far: float) -> float:
         """Return when the tool has gone so far [s]."""
-        return float(np.clip(gone.when(np.array([far]))[0], self.first, self.last))
+        return float(np.clip(travel.when(np.array([far]))[0], self.first, self.last))
 
-    def _fixed(self, gone: PassedLength) -> Array:
+    def _fixed(self, travel: ArcLength) -> Array:
         """Return how far the tool is at ends, events, and where feeds change [m]."""
         start = float(self.operation.motion.t[0])
         changes = [start + item.during.ravel() for item in self.operation.feeds[0]]
         times = np.concatenate([[at for at, _ in self.events], *changes])
-        inside = np.unique(gone.at(times[(times > self.first) & (times < self.last)]))
-        inside = inside[(inside > _STEP) & (inside < gone.whole - _STEP)]
+        inside = np.unique(travel.at(times[(times > self.first) & (times < self.last)]))
+        inside = inside[(inside > _STEP) & (inside < travel.whole - _STEP)]
         inside = inside[np.append(True, np.diff(inside) > _STEP)[: len(inside)]]
-        return np.concatenate([[0.0], inside, [gone.whole]])
+        return np.concatenate([[0.0], inside, [travel.whole]])
 
-    def _along(self, gone: PassedLength, fixed: Array) -> Places:
+    def _along(self, travel: ArcLength, fixed: Array) -> SampledPoses:
         motion = self.operation.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         inside = inside[:: max(1, len(inside) // (_MOST - _FEWEST))]
-        even = np.linspace(0.0, gone.whole, _FEWEST + 1)
-        others = np.unique(np.concatenate([even, gone.at(inside)]))
+        even = np.linspace(0.0, travel.whole, _FEWEST + 1)
+        others = np.unique(np.concatenate([even, travel.at(inside)]))
         others = others[np.append(True, np.diff(others) > _STEP)]
         apart = np.abs(others[:, None] - fixed).min(axis=1) > _STEP
         far = np.sort(np.concatenate([fixed, others[apart]]))
-        q = self._at(gone, far)
-        places, turns = self.frames.places(q)
-        rows = np.hstack([places, on_one_side(turns), q[:, self.frames.external]])
-        return Places(far, q, rows, lambda lengths: self.frames.places(self._at(gone, lengths))[0])
+        q = self._at(travel, far)
+        positions, quaternions = self.frames.tool_poses(q)
+        rows = np.hstack([positions, aligned_quaternions(quaternions), q[:, self.frames.external]])
+        return SampledPoses(
+            far, q, rows, lambda lengths: self.frames.tool_poses(self._at(travel, lengths))[0]
+        )
 
-    def _at(self, gone: PassedLength, far: Array) -> Array:
+    def _at(self, travel: ArcLength, far: Array) -> Array:
         """Return the motion where the tool has gone so far, (K, n)."""
-        return self.operation.motion(np.minimum(gone.when(far), self.last))
+        return self.operation.motion(np.minimum(travel.when(far), self.last))
 
-    def _segment(self, gone: PassedLength, along: Places, steps: Steps) -> FeedSegment:
+    def _segment(self, travel: ArcLength, along: SampledPoses, steps: Steps) -> FeedSegment:
         """Return targets, as the file has them."""
         motion, ends = self.operation.motion, steps.ends
         q = self._in_digits(along.q[ends])
-        places, turns = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
+        positions, quaternions = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
         vias = np.full((len(ends) - 1, 3), np.nan)
         for k in np.flatnonzero(steps.round):
             via = along.middle(ends[k], ends[k + 1])
-            via = self.rounding(via[None], turns[[k]])[0][0]
-            arc = arc_through(places[k], via, places[k + 1])
+            via = self.rounding(via[None], quaternions[[k]])[0][0]
+            arc = arc_through(positions[k], via, positions[k + 1])
             # Halved ones may be too short: they are straight then.
             if arc is not None and arc.is_meant:
                 vias[k] = via
-        found, arrived = self.frames.solved(places, turns, self._mixed(along.q[ends], q))
+        found, arrived = self.frames.solved(positions, quaternions, self._mixed(along.q[ends], q))
         if not arrived.all():
-            at = gone.when(along.gone[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
+            at = travel.when(along.travel[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
-        speeds = self._speeds(gone, along.gone[ends])
-        times = times_at(places, vias, speeds)
-        far = np.append(0.0, np.cumsum(step_lengths(places, vias)))
+        speeds = self._speeds(travel, along.travel[ends])
+        times = times_at(positions, vias, speeds)
+        far = np.append(0.0, np.cumsum(step_lengths(positions, vias)))
 
         def near(own: Array) -> Array:
             share = np.interp(own, times, far) / far[-1]
-            return self._at(gone, share * gone.whole)
+            return self._at(travel, share * travel.whole)
 
         events = [
-            Event(int(np.abs(along.gone[ends] - gone.at(np.array([at]))).argmin()), name)
+            Event(int(np.abs(along.travel[ends] - travel.at(np.array([at]))).argmin()), name)
             for at, name in self.events
         ]
         return FeedSegment(
@@ -256,8 +259,8 @@ class FeedSection(PoseSection):
             times,
             found,
             tuple(events),
-            places=places,
-            turns=on_one_side(turns),
+            positions=positions,
+            quaternions=aligned_quaternions(quaternions),
             frames=self.frames,
             near=near,
             order=np.arange(q.shape[1]),
@@ -266,10 +269,10 @@ class FeedSection(PoseSection):
             seconds=round(self.last - self.first, 5),
         )
 
-    def _speeds(self, gone: PassedLength, ends: Array) -> Array:
+    def _speeds(self, travel: ArcLength, ends: Array) -> Array:
         """Return the feed of each step; beside a feed, what takes as long with its ramps [m/s]."""
-        middles = gone.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
-        found = np.full(len(middles), gone.whole / ((1.0 - _RAMP) * (self.last - self.first)))
+        middles = travel.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
+        found = np.full(len(middles), travel.whole / ((1.0 - _RAMP) * (self.last - self.first)))
         for item in self.operation.feeds[0]:
             for begin, end in item.during:
                 found[(middles >= begin) & (middles <= end)] = item.asked
@@ -282,7 +285,7 @@ class FeedSection(PoseSection):
         """
         times, count = segment.evaluation_times(), len(segment.t) - 1
         exact = segment.reference(self.operation.motion, self.first)
-        at, facing = self.frames.places(exact)
+        at, facing = self.frames.tool_poses(exact)
         worst = np.zeros(count)
         for line in segment.interpolated(times):
             off = line - exact
@@ -291,12 +294,12 @@ class FeedSection(PoseSection):
             swings = ~(swing <= max(_SWING * allowed.free, _LEAST_SWING))
             if swings.any():
                 return float(min(self.first + times[int(swings.argmax())], self.last))
-            places, turns = self.frames.places(line)
-            taken = np.linalg.norm(places - at, axis=1) / allowed.position
+            positions, quaternions = self.frames.tool_poses(line)
+            taken = np.linalg.norm(positions - at, axis=1) / allowed.position
             taken = np.maximum(taken, np.abs(off).max(axis=1) / allowed.free)
-            turned = allowed.turned(self.frames, self.operation.turns, turns, facing)
+            turned = allowed.turned(self.frames, self.operation.rotation_task, quaternions, facing)
             worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
-        return SURE * worst
+        return SAMPLING_FACTOR * worst
 
 
 def paced_section(

@@ -21,11 +21,11 @@ from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.shop.controllers.program_draft import constraints_of
 from selfmotion.shop.controllers.program_facts import check_load
-from selfmotion.shop.controllers.program_files import program_miss, read_program
+from selfmotion.shop.controllers.program_files import program_deviation, read_program
 from selfmotion.shop.controllers.program_steps import ProgramParts, parts_of
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.segments import PoseSegment
-from selfmotion.shop.controllers.thinning import what_lines_keep, what_targets_keep
+from selfmotion.shop.controllers.thinning import constraints_of_lines, constraints_of_targets
 from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
 from selfmotion.work.job import Program, are_opposite
 
@@ -76,7 +76,7 @@ def slow_steps(
             steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
             continue
         _, near = min(moves, key=lambda move: abs(move[0] - number))
-        steps.append(_judged_move(name, near, motions, what_targets_keep))
+        steps.append(_judged_move(name, near, motions, constraints_of_targets))
     return tuple(steps), checked
 
 
@@ -84,9 +84,9 @@ def stated_deviation(program: ControllerProgram) -> Tolerance | None:
     """Return how far off its path a program of a controller says it is; None where it does not."""
     if program.within is not None:
         return program.within
-    miss = program.miss.path
-    sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
-    return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
+    deviation = program.deviation.path
+    sound = np.isfinite([deviation.position, deviation.rotation]).all() and deviation.position > 0.0
+    return Tolerance(deviation.position, max(deviation.rotation, _LEAST)) if sound else None
 
 
 class JudgedProgram(NamedTuple):
@@ -147,7 +147,7 @@ def _judged_move(
     judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
 ) -> JudgedStep:
     """Return the verdict on a move by each interpolation: the first that fails."""
-    smooth, lines = judged(made.constraints), what_lines_keep(judged(made.constraints))
+    smooth, lines = judged(made.constraints), constraints_of_lines(judged(made.constraints))
     moves = [Move(made.robot, lines if k else smooth, motion) for k, motion in enumerate(motions)]
     worst = next((move for move in moves if not move.verified), moves[0])
     interpolation = "" if worst is moves[0] else _STRAIGHT
@@ -161,7 +161,7 @@ def judged_interpolations(
 ) -> tuple[Certificate, Trajectory]:
     """Return the worst certificate of what a controller may make of targets, and its motion.
 
-    The first motion is smooth, the others go straight (`what_lines_keep`).
+    The first motion is smooth, the others go straight (`constraints_of_lines`).
 
     That is the first which is not verified; else the one with the largest error of the path.
     """
@@ -200,7 +200,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     program = read_program(file, job.robot)
     allowed = within or stated_deviation(program)
     parts = parts_of(file, program, job)
-    steps, checked = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
+    steps, checked = _judged_steps(job, parts.motions, allowed, constraints_of_targets, program)
     slow, between = slow_steps(parts, job)
     checked = [item for k, own in enumerate(checked) for item in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
@@ -209,12 +209,12 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *(f"the job itself: {text}" for text in job.failures),
         *gaps(job.robot, checked, digits),
         *_elsewhere(job, checked, digits, program),
-        *([program.begins_elsewhere] if program.begins_elsewhere else []),
-        *misswitched(program, job),
+        *([program.start_fault] if program.start_fault else []),
+        *switching_faults(program, job),
         *_off_moves(file, program, job, parts),
-        *unlike(program, job.robot, constraints_of(job)),
+        *differing_facts(program, job.robot, constraints_of(job)),
     )
-    left = of_the_controller(program)
+    left = controller_note(program)
     return JudgedProgram((*steps, *slow), failures, allowed, shift_note(program), left)
 
 
@@ -224,7 +224,7 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
     Moves by joint targets, which know no work object; and slow motions that go farther than from
     where a joint target is to where the shifted pose of it is, or back.
     """
-    stated = program.miss.moves.joint
+    stated = program.deviation.moves.joint
     for step, motions, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
         if isinstance(step.made, Plan) or is_shifted:
             continue
@@ -263,7 +263,7 @@ def _off_moves(
     if program.shift is not None:
         yield from _shifted_moves(program, job, parts)
         return
-    _, stated, found = program_miss(job, file, program)
+    _, stated, found = program_deviation(job, file, program)
     if any(one > other + 1e-9 for one, other in zip(found.moves, stated.moves, strict=True)):
         yield (
             f"free moves are up to {1e3 * found.moves.position:.4g} mm, joints "
@@ -272,7 +272,7 @@ def _off_moves(
         )
 
 
-def unlike(
+def differing_facts(
     program: ControllerProgram, robot: RobotModel, constraints: Sequence[Constraint]
 ) -> Iterator[str]:
     """Yield what a program rests on that is not so where it is judged: held joints, its load."""
@@ -290,7 +290,7 @@ def unlike(
         yield str(error)
 
 
-def of_the_controller(program: ControllerProgram) -> str:
+def controller_note(program: ControllerProgram) -> str:
     """Return the parts of a program that the controller decides, and that are not judged."""
     if program.within is None:
         return "accelerations are the controller's, and not judged"
@@ -341,7 +341,7 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     return replace(problem, path=path, start=start)
 
 
-def misswitched(program: ControllerProgram, made: object) -> tuple[str, ...]:
+def switching_faults(program: ControllerProgram, made: object) -> tuple[str, ...]:
     """Return the differences between the outputs of a controller's program and its job's events.
 
     A plan, parts or a move have no events.
@@ -405,7 +405,7 @@ def _judged_steps(
             problem = replace(made.problem, constraints=judged(made.problem.constraints))
             if program is not None:
                 problem = as_shifted(problem, program, own[0].q[0])
-            lines = replace(problem, constraints=what_lines_keep(problem.constraints))
+            lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
             tolerance = within or made.tolerance
             certificate, _ = judged_interpolations(
                 own,

@@ -10,7 +10,7 @@ from selfmotion.shop.controllers.pose_numbers import krl_numbers, krl_pose
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_writer import WrittenPose
-from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
+from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
 from selfmotion.shop.controllers.statements import (
     NUMBER,
     Field,
@@ -81,13 +81,13 @@ def _read_pose(reader: ProgramReader, text: str) -> Pose:
     # Linear motions keep the status and turn of where they begin.
     values = _values(reader, text)
     external = {name: value for name, value in values.items() if name.startswith("E")}
-    place, turn = krl_pose(_numbers(reader, values))
-    return Pose(place, turn, reader.external_axes(external), reader.lines.number)
+    position, quaternion = krl_pose(_numbers(reader, values))
+    return Pose(position, quaternion, reader.external_axes(external), reader.lines.number)
 
 
 def _read_frame(reader: ProgramReader, text: str) -> SE3:
-    place, turn = krl_pose(_numbers(reader, _values(reader, text)))
-    return pose_of_values([*place.tolist(), *turn.tolist()])
+    position, quaternion = krl_pose(_numbers(reader, _values(reader, text)))
+    return pose_of_values([*position.tolist(), *quaternion.tolist()])
 
 
 def _write_axes(axes: Mapping[str, str]) -> str:
@@ -95,7 +95,7 @@ def _write_axes(axes: Mapping[str, str]) -> str:
 
 
 def _write_pose(pose: WrittenPose) -> str:
-    numbers = zip("XYZABC", krl_numbers(pose.place, pose.turn), strict=True)
+    numbers = zip("XYZABC", krl_numbers(pose.position, pose.quaternion), strict=True)
     parts = [f"{name} {value:.5f}" for name, value in numbers]
     parts += [pose.configuration] if pose.configuration else []
     parts += [f"{name} {text}" for name, text in pose.axes.items() if name.startswith("E")]
@@ -103,8 +103,8 @@ def _write_pose(pose: WrittenPose) -> str:
 
 
 def _write_frame(pose: SE3) -> str:
-    turn = np.array(Quaternion(pose.rotation).coeffs())
-    return _write_pose(WrittenPose(np.array(pose.translation), turn, {}))
+    quaternion = np.array(Quaternion(pose.rotation).coeffs())
+    return _write_pose(WrittenPose(np.array(pose.translation), quaternion, {}))
 
 
 def _read_speed(reader: ProgramReader, text: str) -> float:

@@ -11,10 +11,10 @@ from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_program import Switch
 from selfmotion.shop.controllers.krl import FASTEST, KRL, TURNING, UNBOUND_TURNING, WHOLE
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
-from selfmotion.shop.controllers.read_segments import Pose, times_of
+from selfmotion.shop.controllers.segment_building import Pose, times_of
 from selfmotion.shop.controllers.segments import (
+    aligned_quaternions,
     fastest_between,
-    on_one_side,
 )
 
 # Difference of a block's time from the sum of its parts below which parts are seconds [s].
@@ -206,10 +206,10 @@ class KrlReader(ProgramReader):
         if len(poses) == len(self.run):
             # It begins at axis targets, which `stop` refuses.
             return
-        places = np.array([pose.place for pose in poses])
-        turns = on_one_side(np.array([pose.turn for pose in poses]))
+        positions = np.array([pose.position for pose in poses])
+        quaternions = aligned_quaternions(np.array([pose.quaternion for pose in poses]))
         times = times_of([target.seconds for target in self.run])
-        fast, turning = fastest_between(times, places, turns)
+        fast, turning = fastest_between(times, positions, quaternions)
         speed = self.settings.get("speed", 0.0)
         least = min(self.settings.get(name, 0.0) for name in _TURNINGS)
         if fast > speed:

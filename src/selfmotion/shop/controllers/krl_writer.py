@@ -212,13 +212,13 @@ _AT_TARGET = TRIGGER.partition("$OUT")[0]
 
 def _unbound(segment: PoseSegment) -> float:
     """Return a speed above what the times of a segment need, if $VEL.CP can be it [m/s]."""
-    fast, _ = fastest_between(segment.t, segment.places, segment.turns)
+    fast, _ = fastest_between(segment.t, segment.positions, segment.quaternions)
     return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_TIMES * fast) / 1e3), _MOST))
 
 
 def _is_straight(segment: PoseSegment) -> bool:
     """Whether all poses are on one line that turns about one axis, one after the other."""
-    rows = np.hstack([segment.places, segment.turns])
+    rows = np.hstack([segment.positions, segment.quaternions])
     length = np.linalg.norm(rows[:, :3] - rows[0, :3], axis=1)
     if length[-1] < _SHORT or (np.diff(length) <= 0.0).any():
         return False

@@ -1,5 +1,6 @@
 """Joint motions as the files that controllers and simulators read."""
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -249,6 +250,29 @@ def read_motion(
     document = read_document(path)
     read = of_tables if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)
+
+
+# Velocities of a point of a message: a list that is not empty.
+_VELOCITIES = re.compile(rb"velocities[\"']?\s*:\s*(\[\s*[-+.0-9]|-\s+[-+.0-9])")
+# Bytes at the head of a file that are searched for velocities.
+_HEAD = 100_000
+
+
+def motion_notes(file: str | Path, *, degrees: bool = False) -> tuple[str, ...]:
+    """Return notes of what `read_motion` takes for granted of a file that is no program."""
+    path = as_path(file)
+    form, angle = SUFFIXES.get(path.suffix.lower(), ""), "degrees" if degrees else "radians"
+    is_message = form in (*MESSAGES, "bag")
+    whose = "messages of ROS are in" if is_message and not degrees else "says no unit: taken for"
+    other = "" if is_message or degrees else " (else: --degrees)"
+    notes = [f"{path}: {whose} {angle}, metres of joints that slide, and seconds{other}"]
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD)
+    if form == "csv" and b"_velocity" not in head:
+        notes.append(f"{path}: says no velocities: those of a cubic spline through its positions")
+    if form == "ros" and not _VELOCITIES.search(head) and b"positions" in head:
+        notes.append(f"{path}: says no velocities: straight lines from point to point")
+    return tuple(notes)
 
 
 def motion_of_program(path: Path, program: ControllerProgram) -> Trajectory:

@@ -23,10 +23,10 @@ _PARTS = 8
 _SI = 9
 
 
-def krl_numbers(place: Array, turn: Array) -> list[float]:
+def krl_numbers(position: Array, quaternion: Array) -> list[float]:
     """Return X, Y, Z [mm], A, B, C [deg] of a pose."""
-    c, b, a = np.degrees(rpy.matrixToRpy(_matrix(turn))).tolist()
-    return [*_rounded(1e3 * place, _MM), *_rounded([a, b, c], _DEGREES)]
+    c, b, a = np.degrees(rpy.matrixToRpy(_matrix(quaternion))).tolist()
+    return [*_rounded(1e3 * position, _MM), *_rounded([a, b, c], _DEGREES)]
 
 
 def krl_pose(numbers: Array) -> tuple[Array, Array]:
@@ -35,10 +35,10 @@ def krl_pose(numbers: Array) -> tuple[Array, Array]:
     return 1e-3 * numbers[:3], _quaternion(rpy.rpyToMatrix(c, b, a))
 
 
-def rapid_numbers(place: Array, turn: Array) -> list[float]:
+def rapid_numbers(position: Array, quaternion: Array) -> list[float]:
     """Return x, y, z [mm], q1, q2, q3, q4 of a pose."""
-    x, y, z, w = (turn if turn[3] >= 0.0 else -turn).tolist()
-    return [*_rounded(1e3 * place, _MM), *_rounded([w, x, y, z], _PARTS)]
+    x, y, z, w = (quaternion if quaternion[3] >= 0.0 else -quaternion).tolist()
+    return [*_rounded(1e3 * position, _MM), *_rounded([w, x, y, z], _PARTS)]
 
 
 def rapid_pose(numbers: Array) -> tuple[Array, Array]:
@@ -47,9 +47,9 @@ def rapid_pose(numbers: Array) -> tuple[Array, Array]:
     return 1e-3 * numbers[:3], np.array([x, y, z, w])
 
 
-def urscript_numbers(place: Array, turn: Array) -> list[float]:
+def urscript_numbers(position: Array, quaternion: Array) -> list[float]:
     """Return x, y, z [m], rx, ry, rz [rad] of a pose."""
-    return [*_rounded(place, _SI), *_rounded(log3(_matrix(turn)), _SI)]
+    return [*_rounded(position, _SI), *_rounded(log3(_matrix(quaternion)), _SI)]
 
 
 def urscript_pose(numbers: Array) -> tuple[Array, Array]:
@@ -67,11 +67,14 @@ _KINDS = {
 def _rounding(form: str) -> Rounding:
     written, read = _KINDS[form]
 
-    def rounded(places: Array, turns: Array) -> tuple[Array, Array]:
+    def rounded(positions: Array, quaternions: Array) -> tuple[Array, Array]:
         poses = [
-            read(np.array(written(place, turn))) for place, turn in zip(places, turns, strict=True)
+            read(np.array(written(position, quaternion)))
+            for position, quaternion in zip(positions, quaternions, strict=True)
         ]
-        return np.array([place for place, _ in poses]), np.array([turn for _, turn in poses])
+        return np.array([position for position, _ in poses]), np.array(
+            [quaternion for _, quaternion in poses]
+        )
 
     return rounded
 
@@ -79,8 +82,8 @@ def _rounding(form: str) -> Rounding:
 ROUNDINGS: Mapping[str, Rounding] = {form: _rounding(form) for form in _KINDS}
 
 
-def _matrix(turn: Array) -> Array:
-    x, y, z, w = (turn / np.linalg.norm(turn)).tolist()
+def _matrix(quaternion: Array) -> Array:
+    x, y, z, w = (quaternion / np.linalg.norm(quaternion)).tolist()
     return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
 

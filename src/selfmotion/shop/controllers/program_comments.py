@@ -17,9 +17,9 @@ from selfmotion.shop.controllers.program_facts import ProgramFacts, with_checksu
 from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_texts import (
     BECAUSE,
-    KEPT,
-    PLANNED,
-    TIMED,
+    DURATION_HEADING,
+    TIMES_HEADING,
+    TOLERANCE_HEADING,
     as_word,
     folded,
     of_word,
@@ -27,8 +27,8 @@ from selfmotion.shop.controllers.program_texts import (
     plain,
     rounded_up,
 )
-from selfmotion.shop.controllers.read_segments import Places, pose_of_values
-from selfmotion.shop.controllers.segments import NO_MISS, Miss, Misses, Segment
+from selfmotion.shop.controllers.segment_building import ProgramFrames, pose_of_values
+from selfmotion.shop.controllers.segments import NO_DEVIATION, Deviation, Deviations, Segment
 from selfmotion.shop.controllers.statements import Field, Statement, Table, seconds, word
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
@@ -58,16 +58,16 @@ COMMENTS = Table(
     },
     statements=(
         Statement("step", "step: <text>", _HEAD),
-        Statement("planned", f"{PLANNED}<seconds> s", _HEAD),
+        Statement("planned", f"{DURATION_HEADING}<seconds> s", _HEAD),
         Statement("deviation", "deviation: <length> mm, <angle> rad, joints <joint:angle>", _HEAD),
         Statement(
             "deviation of moves",
             "deviation of moves: <length> mm, <angle> rad, joints <joint:angle>",
             _HEAD,
         ),
-        Statement("tolerance", f"{KEPT}<length> mm, <angle> rad", _HEAD),
+        Statement("tolerance", f"{TOLERANCE_HEADING}<length> mm, <angle> rad", _HEAD),
         Statement("joint targets", f"{BECAUSE}<text>", _HEAD),
-        Statement("times", f"{TIMED}<text>", _HEAD),
+        Statement("times", f"{TIMES_HEADING}<text>", _HEAD),
         Statement(
             "poses", "poses: work object <work:link> of <carrier:link>, flange <flange:link>", _HEAD
         ),
@@ -142,16 +142,16 @@ class Comments:
         """Return the facts stated in the comments so far; None if there are none."""
         return ProgramFacts.stated(self.lines.notes)
 
-    def miss(self) -> Misses:
+    def deviation(self) -> Deviations:
         """Return the deviations that the comments state, or ones without bounds."""
-        path = self._miss("deviation")
+        path = self._deviation("deviation")
         if path is None:
-            return Misses(*[Miss(np.inf, np.inf, np.inf)] * 2)
-        return Misses(path, self._miss("deviation of moves") or path)
+            return Deviations(*[Deviation(np.inf, np.inf, np.inf)] * 2)
+        return Deviations(path, self._deviation("deviation of moves") or path)
 
-    def _miss(self, kind: str) -> Miss | None:
+    def _deviation(self, kind: str) -> Deviation | None:
         for values in self.stated(kind):
-            return Miss(1e-3 * values["length"], values["angle"], values["joint"])
+            return Deviation(1e-3 * values["length"], values["angle"], values["joint"])
         return None
 
     def tolerance(self) -> Tolerance | None:
@@ -160,9 +160,9 @@ class Comments:
             return Tolerance(1e-3 * values["length"], values["angle"])
         return None
 
-    def places(self, tool: SE3 | None, work: SE3 | None) -> Places:
+    def program_frames(self, tool: SE3 | None, work: SE3 | None) -> ProgramFrames:
         """Return the frames of poses by the comments and by the program's own declarations."""
-        found = Places(tool=tool, work=work)
+        found = ProgramFrames(tool=tool, work=work)
         for values in self.stated("poses"):
             found.work_name, found.carrier = values["work"], values["carrier"]
             found.flange = values["flange"]
@@ -179,7 +179,7 @@ def head(draft: Draft) -> list[str]:
         f"{axis.name} = {as_word(axis.joint)} [{'mm' if axis.slides else 'deg'}]"
         for axis in program.axes
     )
-    moves = program.miss.moves
+    moves = program.deviation.moves
     targets = "target" if program.targets == 1 else "targets"
     notes = [
         plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
@@ -187,8 +187,8 @@ def head(draft: Draft) -> list[str]:
         plain(COMMENTS.text("axes", text=axes)),
         *draft.facts.notes,
         *_of_speeds(program),
-        _of_miss("deviation", program.miss.path),
-        *([] if moves == NO_MISS else [_of_miss("deviation of moves", moves)]),
+        _of_deviation("deviation", program.deviation.path),
+        *([] if moves == NO_DEVIATION else [_of_deviation("deviation of moves", moves)]),
         f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
         "through the targets, at the times of the plan; of seams at speeds where the tool has gone",
         "as far)",
@@ -221,9 +221,11 @@ def _of_speeds(program: ControllerProgram) -> list[str]:
     ]
 
 
-def _of_miss(kind: str, miss: Miss) -> str:
+def _of_deviation(kind: str, deviation: Deviation) -> str:
     """Return the comment that states a deviation."""
-    return COMMENTS.text(kind, length=1e3 * miss.position, angle=miss.rotation, joint=miss.joint)
+    return COMMENTS.text(
+        kind, length=1e3 * deviation.position, angle=deviation.rotation, joint=deviation.joint
+    )
 
 
 def _lines(draft: Draft) -> str:

@@ -28,7 +28,7 @@ from selfmotion.shop.controllers.program_settings import (
     tool_from_flange,
 )
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.segments import Misses
+from selfmotion.shop.controllers.segments import Deviations
 from selfmotion.shop.controllers.targets import (
     NotByPosesError,
     PosedSections,
@@ -106,16 +106,16 @@ def drafted(
             posed: PosedSections = partial(made, frames=frames, rounding=ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
-            segments, miss = segments_of(*given, posed)
+            segments, deviation = segments_of(*given, posed)
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
         frames = None
-        segments, miss = segments_of(*given)
+        segments, deviation = segments_of(*given)
     order = in_order(axes)
     sorted_ones = tuple(item.in_order(order) for item in segments)
     ordered = tuple(axes[k] for k in order)
-    stated = Misses(miss.path.stated, miss.moves.stated)
+    stated = Deviations(deviation.path.stated, deviation.moves.stated)
     at_speeds = any(isinstance(item, FeedSegment) for item in sorted_ones)
     within = settings.deviation if at_speeds else None
     program = ControllerProgram(

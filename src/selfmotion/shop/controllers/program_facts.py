@@ -18,7 +18,7 @@ from selfmotion.shop.controllers.program_settings import (
     flange_of,
     tool_from_flange,
 )
-from selfmotion.shop.controllers.program_texts import KEPT, plain
+from selfmotion.shop.controllers.program_texts import TOLERANCE_HEADING, plain
 
 # Beginnings of comments that state these facts.
 _HELD = "held joints: "
@@ -30,7 +30,14 @@ _APPROACH = "approach: "
 _FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT, _LOAD, _APPROACH)
 # Other statements of a head that readers use; the checksum guards all of them.
 _BELIEVED = (
-    *("axes: ", "deviation: ", "deviation of moves: ", KEPT, "poses: ", "planned work object: "),
+    *(
+        "axes: ",
+        "deviation: ",
+        "deviation of moves: ",
+        TOLERANCE_HEADING,
+        "poses: ",
+        "planned work object: ",
+    ),
     *_FACTS,
 )
 _CHECKSUM = "checksum of what is stated: "

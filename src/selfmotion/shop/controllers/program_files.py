@@ -15,7 +15,7 @@ from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.rapid_reader import RapidReader
 from selfmotion.shop.controllers.rapid_writer import write_rapid
-from selfmotion.shop.controllers.segments import Misses
+from selfmotion.shop.controllers.segments import Deviations
 from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.work.job import Program
 
@@ -65,7 +65,7 @@ def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft:
         trial = FilePath(folder) / file.name
         _WRITERS[form](trial, draft)
         try:
-            _, stated, found = program_miss(plan, trial)
+            _, stated, found = program_deviation(plan, trial)
         except FileFormatError as error:
             return f"read again, {str(error).removeprefix(f'{trial}: ')}"
     if keeps_stated(found, stated):
@@ -73,7 +73,7 @@ def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft:
     return "read again, poses leave the motion: the arm is singular, or nearly so"
 
 
-def keeps_stated(found: Misses, stated: Misses) -> bool:
+def keeps_stated(found: Deviations, stated: Deviations) -> bool:
     """Whether a program is no farther off its motion than it states, in the digits of files."""
     pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
     return all(one <= other + 1e-9 for one, other in pairs)
@@ -90,9 +90,9 @@ def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerP
     return _READERS[file.suffix.lower()](file, robot).program()
 
 
-def program_miss(
+def program_deviation(
     plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
-) -> tuple[int, Misses, Misses]:
+) -> tuple[int, Deviations, Deviations]:
     """Return the contents of a program file: targets, the deviations it states, and its kind.
 
     The file is read unless it was `read` before.
@@ -104,6 +104,6 @@ def program_miss(
     """
     found = read or read_program(file, plan.robot)
     try:
-        return found.targets, found.miss, found.miss_of(plan)
+        return found.targets, found.deviation, found.deviation_of(plan)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error

@@ -16,8 +16,8 @@ from selfmotion.shop.controllers.program_comments import Comments
 from selfmotion.shop.controllers.program_facts import Load
 from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_settings import Axis
-from selfmotion.shop.controllers.program_texts import PLANNED
-from selfmotion.shop.controllers.read_segments import Follower, Places, Pose, Row
+from selfmotion.shop.controllers.program_texts import DURATION_HEADING
+from selfmotion.shop.controllers.segment_building import Pose, ProgramFrames, Row, SegmentBuilder
 from selfmotion.shop.controllers.statements import Language
 from selfmotion.shop.controllers.tool_frames import WORLD
 
@@ -128,17 +128,17 @@ class ProgramReader:
             self.state = statement.then or self.state
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.language.last}")
-        places = self.comments.places(self.tool, self.work)
-        places.is_carried = self.is_carried
+        program_frames = self.comments.program_frames(self.tool, self.work)
+        program_frames.is_carried = self.is_carried
         facts, unit = self.comments.facts(), self.settings.get("unit", "")
         if facts is not None and unit and facts.positioner not in ("", unit):
             raise self.lines.fault(
                 f"its work object is carried by mechanical unit '{unit}', it was written for "
                 f"'{facts.positioner}'"
             )
-        return self._program(places)
+        return self._program(program_frames)
 
-    def _program(self, places: Places) -> ControllerProgram:
+    def _program(self, program_frames: ProgramFrames) -> ControllerProgram:
         """Return the program of the rows of targets, and of what is switched.
 
         Raises
@@ -160,24 +160,24 @@ class ProgramReader:
                     f"{file}: has tool poses, whose joint positions need the robot: give it "
                     f"(read_motion(file, robot=…), check --robot)"
                 )
-            frames = places.frames(self.robot, axes, file)
-        follower = Follower(file, axes, frames)
+            frames = program_frames.frames(self.robot, axes, file)
+        builder = SegmentBuilder(file, axes, frames)
         for row in self.rows:
-            follower.take(row.with_axes(columns))
-        if not follower.segments:
+            builder.add(row.with_axes(columns))
+        if not builder.segments:
             raise FileFormatError(f"{file}: has no targets with times")
         return ControllerProgram(
             self.name,
             axes,
-            tuple(follower.segments),
-            self.comments.miss(),
+            tuple(builder.segments),
+            self.comments.deviation(),
             tuple(self.switches),
-            places.shift,
-            WORLD if frames is None else places.carrier,
+            program_frames.shift,
+            WORLD if frames is None else program_frames.carrier,
             next(iter(self.comments.texts("joint targets")), ""),
             self.comments.tolerance(),
             tuple(dict.fromkeys(self.comments.texts("times"))),
-            follower.approach,
+            builder.approach,
             self.comments.facts(),
             self.load,
         )
@@ -323,12 +323,12 @@ class ProgramReader:
         every = self._every(run)
         if planned is None:
             raise self.lines.fault(
-                f"a motion at a speed needs the comment '{PLANNED}… s' before it, which says how "
-                f"long all up to the next stop was planned to take"
+                f"a motion at a speed needs the comment '{DURATION_HEADING}… s' before it, which "
+                f"says how long all up to the next stop was planned to take"
             )
         speeds = [target.speed for target in run]
-        vias = np.array([[np.nan] * 3 if x.via is None else x.via.place for x in run])
-        own = times_at(np.array([x.place for x in every if isinstance(x, Pose)]), vias, speeds)
+        vias = np.array([[np.nan] * 3 if x.via is None else x.via.position for x in run])
+        own = times_at(np.array([x.position for x in every if isinstance(x, Pose)]), vias, speeds)
         if not (np.diff(own) > 0.0).all():
             k = int(np.argmin(np.diff(own)))
             raise self.lines.fault(

@@ -16,17 +16,17 @@ _WIDTH = 100
 # Beginning of the comment that says why targets are joints.
 BECAUSE = "targets are joints, as poses do not keep the motion: "
 # Beginning of the comment that says why a seam with a feed has times all the same.
-TIMED = "with times: "
+TIMES_HEADING = "with times: "
 # Beginning of the comment that says which tolerance seams at speeds keep.
-KEPT = "kept of what is prescribed: "
+TOLERANCE_HEADING = "kept of what is prescribed: "
 # Beginning of the comment with the planned duration of a segment at speeds.
-PLANNED = "planned time: "
+DURATION_HEADING = "planned time: "
 
 
 def pin_values(pose: SE3) -> list[float]:
     """Return a pose as position [m] and quaternion x, y, z, w."""
-    turn = Quaternion(pose.rotation).coeffs()
-    return [float(value) + 0.0 for value in (*pose.translation, *turn)]
+    quaternion = Quaternion(pose.rotation).coeffs()
+    return [float(value) + 0.0 for value in (*pose.translation, *quaternion)]
 
 
 def rounded_up(value: float, digits: int) -> str:

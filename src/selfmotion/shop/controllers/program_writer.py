@@ -23,7 +23,7 @@ class WrittenPose(NamedTuple):
 
     Attributes
     ----------
-    place, turn : (3,), (4,)
+    position, quaternion : (3,), (4,)
         Position [m], and quaternion x, y, z, w.
     axes : mapping
         Axis → its coordinate, as text.
@@ -31,8 +31,8 @@ class WrittenPose(NamedTuple):
         Of the arm, in the language.
     """
 
-    place: Array
-    turn: Array
+    position: Array
+    quaternion: Array
     axes: Mapping[str, str]
     configuration: str = ""
 
@@ -148,7 +148,7 @@ class ProgramWriter(ABC):
     def pose(self, segment: PoseSegment, k: int, configuration: str = "") -> WrittenPose:
         """Return the pose of a target."""
         axes = self.axes(segment, k)
-        return WrittenPose(segment.places[k], segment.turns[k], axes, configuration)
+        return WrittenPose(segment.positions[k], segment.quaternions[k], axes, configuration)
 
     def positioner(self, kind: type[int] | type[str], said: str) -> Any:
         """Return the mechanical unit that carries the work object.

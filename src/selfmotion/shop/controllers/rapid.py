@@ -11,7 +11,7 @@ from selfmotion.shop.controllers.pose_numbers import rapid_numbers, rapid_pose
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_writer import WrittenPose
-from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
+from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
 from selfmotion.shop.controllers.statements import (
     Field,
     Language,
@@ -87,9 +87,9 @@ def _is_absent(reader: ProgramReader, name: str, text: str) -> bool:
 
 
 def _read_pose(reader: ProgramReader, text: str) -> Pose:
-    place, turn, configuration, external = re.findall(_LIST, text)
+    trans, rot, configuration, external = re.findall(_LIST, text)
     _numbers(reader, configuration, 4, "robconf")
-    position, rotation = rapid_pose(_place_and_turn(reader, place, turn))
+    position, rotation = rapid_pose(_pose_numbers(reader, trans, rot))
     outer = dict(zip(AXES[6:], _texts(reader, external, 6, "extax"), strict=True))
     present = {
         name: reader.lines.coordinate(item)
@@ -99,16 +99,16 @@ def _read_pose(reader: ProgramReader, text: str) -> Pose:
     return Pose(position, rotation, reader.external_axes(present), reader.lines.number)
 
 
-def _place_and_turn(reader: ProgramReader, place: str, turn: str) -> Array:
-    numbers = [*_numbers(reader, place, 3, "trans"), *_numbers(reader, turn, 4, "rot")]
+def _pose_numbers(reader: ProgramReader, trans: str, rot: str) -> Array:
+    numbers = [*_numbers(reader, trans, 3, "trans"), *_numbers(reader, rot, 4, "rot")]
     if not any(numbers[3:]):
         raise reader.lines.fault("the quaternion is zero")
     return np.array(numbers)
 
 
 def _read_frame(reader: ProgramReader, text: str) -> SE3:
-    x, y, z, *turn = _place_and_turn(reader, *re.findall(_LIST, text)).tolist()
-    return pose_of_values([1e-3 * x, 1e-3 * y, 1e-3 * z, *turn[1:], turn[0]])
+    x, y, z, *quaternion = _pose_numbers(reader, *re.findall(_LIST, text)).tolist()
+    return pose_of_values([1e-3 * x, 1e-3 * y, 1e-3 * z, *quaternion[1:], quaternion[0]])
 
 
 def _write_lists(*lists: Sequence[str]) -> str:
@@ -122,7 +122,7 @@ def _write_axes(axes: Mapping[str, str]) -> str:
 
 
 def _write_pose(pose: WrittenPose) -> str:
-    numbers = rapid_numbers(pose.place, pose.turn)
+    numbers = rapid_numbers(pose.position, pose.quaternion)
     return _write_lists(
         [f"{value:.4f}" for value in numbers[:3]],
         [f"{value:.8f}" for value in numbers[3:]],

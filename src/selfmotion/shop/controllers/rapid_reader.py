@@ -11,7 +11,7 @@ from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.feed_segments import ZONE
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.rapid import APPROACH_TURNING, FASTEST, RAPID, SLOW, TURNING
-from selfmotion.shop.controllers.read_segments import Pose
+from selfmotion.shop.controllers.segment_building import Pose
 
 # Zones of seams at speeds, in which corners are rounded by as much as is judged.
 _ZONES = ("fine", "z0")

@@ -15,6 +15,8 @@ from selfmotion.work.job import Program
 
 # Decimals of times in messages [s]: whole nanoseconds.
 _DIGITS = 9
+# Difference of times that are written alike: two roundings to whole nanoseconds [s].
+_UNEVEN = 2.1e-9
 # Smallest number of samples of a motion.
 _FEWEST = 4
 # Shares of an interval at which straight lines are compared with the motion.
@@ -83,8 +85,8 @@ class MotionSamples:
         return MotionSamples(names, joints, self.t, *orders)
 
 
-class LinearMiss(NamedTuple):
-    """How far a controller that joins samples by straight lines leaves a plan's motion.
+class LinearDeviation(NamedTuple):
+    """Deviation of linear interpolation between samples from a plan's motion.
 
     Attributes
     ----------
@@ -101,7 +103,7 @@ class LinearMiss(NamedTuple):
     rate: float | None
 
 
-def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
+def linear_deviation(plan: Plan, rate: float | None = None) -> LinearDeviation:
     """Return the error of linear interpolation between the samples of a file; see `write_motion`.
 
     Raises
@@ -109,17 +111,17 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     ProblemError
         The rate is not positive, or gives no two samples.
     """
-    misses, _ = _misses(plan, rate)
-    position, rotation = misses.max(axis=0).tolist()
-    return LinearMiss(position, rotation, _rate_that_keeps(plan))
+    deviations, _ = _deviations(plan, rate)
+    position, rotation = deviations.max(axis=0).tolist()
+    return LinearDeviation(position, rotation, _rate_that_keeps(plan))
 
 
-def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
+def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
     """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
     intervals = np.diff(samples.t)
-    misses = np.zeros((len(intervals), 2))
+    deviations = np.zeros((len(intervals), 2))
     for share in _BETWEEN:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * intervals, motion.t[-1])
         straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
@@ -129,8 +131,8 @@ def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
             # |R - R'| is 2√2 sin(angle / 2).
             half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
-            misses = np.maximum(misses, np.stack([far, angle], axis=1))
-    return misses, intervals
+            deviations = np.maximum(deviations, np.stack([far, angle], axis=1))
+    return deviations, intervals
 
 
 def _rate_that_keeps(plan: Plan) -> float | None:
@@ -143,8 +145,8 @@ def _rate_that_keeps(plan: Plan) -> float | None:
     lowest = float(np.ceil(1.0 / duration))
 
     def needed(rate: float | None) -> tuple[float, bool]:
-        misses, intervals = _misses(plan, rate)
-        share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
+        deviations, intervals = _deviations(plan, rate)
+        share = (deviations / [tolerance.position, tolerance.rotation]).max(axis=1)
         # The miss of a line over a span h is that of a parabola: it grows with h².
         found = float(np.ceil((np.sqrt(share) / intervals).max()))
         return max(found, lowest), bool(share.max() <= 1.0)
@@ -194,6 +196,21 @@ def within_limits_at(plan: Plan, rate: float | None) -> Plan:
         return plan
     slower = at_rate(plan, rate)
     return slower if slower.certificate.verified else plan
+
+
+def slowed_as(plan: Plan, motion: Trajectory) -> Plan:
+    """Return a retimed plan as slow as a motion that `within_limits_at` made of it.
+
+    The rate is that of the motion's samples. Any other plan is returned as it is, and so is one of
+    which the motion is not made so.
+    """
+    steps = np.diff(motion.t)
+    is_even = np.ptp(steps) <= _UNEVEN
+    if not (is_retimed(plan) and is_even and motion.duration > plan.trajectory.duration + _UNEVEN):
+        return plan
+    slower = within_limits_at(plan, len(steps) / motion.duration)
+    is_same = abs(slower.trajectory.duration - motion.duration) <= _UNEVEN
+    return slower if is_same else plan
 
 
 def for_cubics(motion: Trajectory) -> Trajectory:

@@ -14,18 +14,18 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import Chain
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# Ratio of the largest deviation to the largest one at the times that are evaluated.
-SURE = 1.02
-# Share of the shorter side of a corner within which the velocity changes.
-_CORNER = 1e-3
-# Shares of the interval between two joint targets at which the error is evaluated.
-_BETWEEN = np.linspace(0.0, 1.0, 8, endpoint=False)
-# Shares of the interval between two poses at which joints are evaluated, which bend in between.
-_BETWEEN_POSES = np.linspace(0.0, 1.0, 16, endpoint=False)
-# Share of an interval that is its target alone.
-_AT_TARGET = np.zeros(1)
-# Sine of the angle below which slerp is a straight line.
-_SMALL = 1e-9
+# Factor from the largest deviation at the sampled times to an upper bound between them.
+SAMPLING_FACTOR = 1.02
+# Blend at a corner of a polygon, as a share of the shorter adjacent interval.
+_CORNER_SHARE = 1e-3
+# Sample points of an interval between two joint targets, as shares of it.
+_JOINT_SAMPLES = np.linspace(0.0, 1.0, 8, endpoint=False)
+# Sample points of an interval between two poses, as shares of it: joints curve in between.
+_POSE_SAMPLES = np.linspace(0.0, 1.0, 16, endpoint=False)
+# The only sample point of an interval whose knots are its targets.
+_TARGET_SAMPLE = np.zeros(1)
+# Sine of an angle below which slerp is replaced by linear interpolation.
+_SMALL_SINE = 1e-9
 
 # Rows of joints or poses at times (K,), by one interpolation.
 Curve = Callable[[Array], Array]
@@ -61,7 +61,7 @@ class Knots(NamedTuple):
         if not np.isfinite(q).all():
             return cls(t, q, q)
         rates: Array = CubicSpline(t, q, bc_type="clamped")(t, 1)
-        # A spline leaves digits of rest.
+        # Rounding of the spline's rates at rest.
         rates[[0, -1]] = 0.0
         return cls(t, q, rates)
 
@@ -69,7 +69,7 @@ class Knots(NamedTuple):
     def cornered(cls, t: Array, q: Array, each: int) -> "Knots":
         """Return a motion (K, n) that is smooth but for a corner at every `each`-th of its times.
 
-        There the velocity changes within a short time, as it does at both ends.
+        There, and at both ends, the velocity changes within a short time.
         """
         from scipy.interpolate import CubicSpline
 
@@ -77,8 +77,8 @@ class Knots(NamedTuple):
             return cls(t, q, q)
         corners = t[::each]
         sides = np.diff(corners)
-        reach = _CORNER * np.minimum(np.append(sides, np.inf), np.append(np.inf, sides))
-        times, places, rates = [t[:1]], [q[:1]], [0.0 * q[:1]]
+        reach = _CORNER_SHARE * np.minimum(np.append(sides, np.inf), np.append(np.inf, sides))
+        times, positions, rates = [t[:1]], [q[:1]], [0.0 * q[:1]]
         for k in range(len(sides)):
             own = slice(k * each, (k + 1) * each + 1)
             ends = corners[k] + reach[k], corners[k + 1] - reach[k + 1]
@@ -90,12 +90,12 @@ class Knots(NamedTuple):
                 spline = CubicSpline(t[own], q[own])
                 here, rate = spline(at), spline(at, 1)
             times.append(at)
-            places.append(here)
+            positions.append(here)
             rates.append(rate)
         times.append(t[-1:])
-        places.append(q[-1:])
+        positions.append(q[-1:])
         rates.append(0.0 * q[-1:])
-        return cls(np.concatenate(times), np.concatenate(places), np.concatenate(rates))
+        return cls(np.concatenate(times), np.concatenate(positions), np.concatenate(rates))
 
 
 def by_interpolation(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
@@ -110,21 +110,22 @@ def by_interpolation(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A motion from rest to rest by its targets, or a rest.
+    """A motion from rest to rest through targets, or a pause.
 
     Attributes
     ----------
     name : str
-        Of the seam or move.
+        Name of the seam or move.
     t : (K + 1,)
-        When each target is reached, from 0 [s].
+        Time of each target, from 0 [s].
     q : (K + 1, n)
-        Where it begins, and its targets [rad or m].
+        Initial configuration and targets [rad or m].
     events : tuple of Event
     remark : str
-        What there is to say of it.
+        Comment for the program.
     is_slow : bool
-        Whether it is no part of the plan but a slow motion to where a shifted program goes on.
+        Whether it is an inserted slow motion to the next target of a shifted program, and no part
+        of the plan.
     """
 
     name: str
@@ -134,18 +135,18 @@ class Segment:
     remark: str = ""
     is_slow: bool = False
 
-    # Shares of an interval at which deviations are evaluated, and at which motions have knots.
-    evaluated: ClassVar[Array] = _BETWEEN
-    knots: ClassVar[Array] = _AT_TARGET
+    # Sample points of an interval for deviations, and knots of motions, as shares of the interval.
+    evaluated: ClassVar[Array] = _JOINT_SAMPLES
+    knots: ClassVar[Array] = _TARGET_SAMPLE
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration of the segment [s]."""
         return float(self.t[-1])
 
     @property
     def is_rest(self) -> bool:
-        """Whether the arm rests all the while."""
+        """Whether the arm is at rest throughout."""
         return bool((self.q == self.q[0]).all())
 
     def in_order(self, order: Sequence[int]) -> "Segment":
@@ -154,11 +155,11 @@ class Segment:
 
     @property
     def rows(self) -> Array:
-        """Rows that are interpolated, one a target: joints, (K + 1, n)."""
+        """Coordinates that are interpolated, a row per target: joints, (K + 1, n)."""
         return self.q
 
     def between(self, times: Array, t: Array, rows: Array) -> Array:
-        """Return rows at times, straight between those at t."""
+        """Return rows at times by linear interpolation of the rows at t."""
         return straight_joints(times, t, rows)
 
     def spline(self, times: Array) -> Array:
@@ -174,7 +175,7 @@ class Segment:
 
     @property
     def curves(self) -> list[Curve]:
-        """Interpolations that a controller may use: straight, with cut corners, smooth."""
+        """Interpolations of a controller: polygon, polygon with blended corners, cubic spline."""
         lines = polygons(self.t, self.rows, self.between)
         found: list[Curve] = [partial(self.between, t=t, rows=rows) for t, rows in lines]
         return found if len(self.t) < 3 else [*found, self.spline]
@@ -188,14 +189,14 @@ class Segment:
         return [self.joints(curve(times), times) for curve in self.curves]
 
     def reference(self, motion: Trajectory, first: float) -> Array:
-        """Return a motion begun at `first`, at the times that are evaluated, (K, n)."""
+        """Return a planned motion from time `first` on, at the evaluation times (K, n)."""
         return motion(np.clip(first + self.evaluation_times(), motion.t[0], motion.t[-1]))
 
     def motions(self) -> Iterator[Knots]:
-        """Yield the joint motion by each interpolation: smooth, straight, with cut corners.
+        """Yield the joint motion by each interpolation: spline, polygon, blended corners.
 
-        With as few knots as it takes: see `miss_of` for what these are. NaN where no joints are
-        known.
+        With as few knots as it takes; `deviation_of` describes the interpolations. NaN where no
+        joints are known.
         """
         times = finer(self.t, self.knots)
         yield Knots.smooth(times, self.joints(self.spline(times), times))
@@ -205,15 +206,15 @@ class Segment:
             yield Knots.cornered(times, q, len(self.knots))
 
 
-class Miss(NamedTuple):
-    """How far targets take a controller off the motion, at the time where it is farthest.
+class Deviation(NamedTuple):
+    """Largest deviation of a controller's motion from the planned one.
 
     Attributes
     ----------
     position, rotation : float
         Of the tool [m, rad].
     joint : float
-        Of a joint [rad or m].
+        Of any joint [rad or m].
     """
 
     position: float
@@ -221,88 +222,92 @@ class Miss(NamedTuple):
     joint: float
 
     def share(self, allowed: Tolerance) -> float:
-        """Return how much of what is allowed it takes: above 1 too much."""
+        """Return the deviation as a share of the tolerance; above 1 it is violated."""
         rotation = max(self.rotation, self.joint) / allowed.rotation
-        return SURE * max(self.position / allowed.position, rotation)
+        return SAMPLING_FACTOR * max(self.position / allowed.position, rotation)
 
     @property
-    def stated(self) -> "Miss":
-        """As files state it: the worst lies between the times that are looked at."""
-        return Miss(SURE * self.position, SURE * self.rotation, SURE * self.joint)
+    def stated(self) -> "Deviation":
+        """The value that files state: with a factor for maxima between the sampled times."""
+        return Deviation(
+            SAMPLING_FACTOR * self.position,
+            SAMPLING_FACTOR * self.rotation,
+            SAMPLING_FACTOR * self.joint,
+        )
 
 
-class Misses(NamedTuple):
-    """How far targets take a controller off what it makes, and off moves through the air.
+class Deviations(NamedTuple):
+    """Largest deviations along seams, and in free moves.
 
     Attributes
     ----------
     path, moves : Miss
     """
 
-    path: Miss
-    moves: Miss
+    path: Deviation
+    moves: Deviation
 
-    def worse(self, other: "Misses") -> "Misses":
-        """Return the larger ones of both."""
-        return Misses(*(Miss(*map(max, *pair)) for pair in zip(self, other, strict=True)))
-
-
-NO_MISS = Miss(0.0, 0.0, 0.0)
+    def worse(self, other: "Deviations") -> "Deviations":
+        """Return the componentwise maximum."""
+        return Deviations(*(Deviation(*map(max, *pair)) for pair in zip(self, other, strict=True)))
 
 
-def miss_of(
+NO_DEVIATION = Deviation(0.0, 0.0, 0.0)
+
+
+def deviation_of(
     segment: Segment, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
-) -> Miss:
-    """Return how far a controller is off a motion at most, whichever interpolation it uses.
+) -> Deviation:
+    """Return the largest deviation of a segment from a motion over all interpolations.
 
-    In between it may go straight in joint space, past each corner on the line between the middles
-    of the two sides, which is the largest corner that controllers round, or along the cubic spline
-    through all targets that begins and ends at rest; at the times of the motion, which holds it to
-    its speeds as well. Segments at a speed are held to where it goes alone.
+    Between targets a controller may interpolate linearly in joint space; blend each corner along
+    the line between the midpoints of its two sides, the largest blend of any controller; or follow
+    the clamped cubic spline through all targets. All are compared at equal times, which bounds the
+    speeds as well; segments at a speed are compared at equal arc lengths.
     """
     times, exact = segment.evaluation_times(), segment.reference(motion, first)
-    worst = NO_MISS
+    worst = NO_DEVIATION
     for line in segment.interpolated(times):
-        worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
+        worst = Deviation(*map(max, worst, deviation_between(line, exact, chains)))
     return worst
 
 
-def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
-    """Return how far configurations (K, n) are off others at most, one by one.
+def deviation_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Deviation:
+    """Return the largest deviation between two sequences of configurations (K, n).
 
-    It is infinite where they are not numbers: no joints are known of a pose.
+    Infinite where a configuration is NaN: inverse kinematics has no solution there.
     """
     from scipy.spatial.transform import Rotation
 
     if not np.isfinite(q).all():
-        return Miss(np.inf, np.inf, np.inf)
+        return Deviation(np.inf, np.inf, np.inf)
     position = rotation = 0.0
     for chain in chains:
         _, here, there = chain.along(q)
         _, turned, placed = chain.along(exact)
         position = max(position, float(np.linalg.norm(there - placed, axis=1).max()))
-        turns = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
-        rotation = max(rotation, float(turns.max()))
-    return Miss(position, rotation, float(np.abs(q - exact).max()))
+        quaternions = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
+        rotation = max(rotation, float(quaternions.max()))
+    return Deviation(position, rotation, float(np.abs(q - exact).max()))
 
 
 def finer(t: Array, between: Array) -> Array:
-    """Return times with others between each two, `between` as shares from 0 on."""
+    """Return times with further ones in each interval, at `between` as shares of it."""
     return np.append((t[:-1, None] + between * np.diff(t)[:, None]).ravel(), t[-1])
 
 
 def polygons(
     t: Array, rows: Array, between: Callable[[Array, Array, Array], Array]
 ) -> list[tuple[Array, Array]]:
-    """Return the polygon of targets, and that whose corners are cut from middle to middle.
+    """Return the polygon through targets, and that through the midpoints of its sides.
 
     Parameters
     ----------
     t : (K,)
     rows : (K, m)
-        Of joints, or of poses.
+        Joints or poses.
     between : callable
-        Times, the times of rows, rows → rows at these times, straight between those given.
+        Interpolation: times, times of rows, rows → rows at these times.
     """
     if len(t) < 3:
         return [(t, rows)]
@@ -311,7 +316,7 @@ def polygons(
 
 
 def straight_joints(times: Array, t: Array, q: Array) -> Array:
-    """Return joints (K, n) at times, linear between those at t."""
+    """Return joints (K, n) at times by linear interpolation."""
     return np.stack([np.interp(times, t, column) for column in q.T], axis=1)
 
 
@@ -326,28 +331,28 @@ def straight_joints(times: Array, t: Array, q: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PoseSegment(Segment):
-    """A motion from rest to rest by tool poses.
+    """A motion from rest to rest through tool poses.
 
     Attributes
     ----------
-    places, turns : (K + 1, 3), (K + 1, 4)
-        The tool in the work object: positions [m], and quaternions x, y, z, w, each on the side of
-        the one before.
+    positions, quaternions : (K + 1, 3), (K + 1, 4)
+        Tool poses in the work object: positions [m], and quaternions x, y, z, w, each with the sign
+        that is nearer to the previous one.
     frames : ToolFrames
     near : callable
-        Times → joint positions (K, n) in the robot's order, from which inverse kinematics begins.
+        Times → initial guesses of inverse kinematics (K, n), in the robot's order.
     order : (n,)
-        Which of the robot's joints each column of `q` is.
+        Index of the robot's joint for each column of `q`.
     """
 
-    places: Array
-    turns: Array
+    positions: Array
+    quaternions: Array
     frames: ToolFrames
     near: Callable[[Array], Array]
     order: Ints
 
-    evaluated: ClassVar[Array] = _BETWEEN_POSES
-    knots: ClassVar[Array] = _BETWEEN_POSES
+    evaluated: ClassVar[Array] = _POSE_SAMPLES
+    knots: ClassVar[Array] = _POSE_SAMPLES
 
     @override
     def in_order(self, order: Sequence[int]) -> "PoseSegment":
@@ -358,7 +363,7 @@ class PoseSegment(Segment):
     def rows(self) -> Array:
         """See `Segment.rows`: positions, quaternions and external axes, (K + 1, 7 + m)."""
         own = self.q[:, np.argsort(self.order)]
-        return np.hstack([self.places, self.turns, own[:, self.frames.external]])
+        return np.hstack([self.positions, self.quaternions, own[:, self.frames.external]])
 
     @override
     def between(self, times: Array, t: Array, rows: Array) -> Array:
@@ -379,18 +384,18 @@ class PoseSegment(Segment):
 
 
 def straight(times: Array, t: Array, rows: Array) -> Array:
-    """Return rows (K, 7 + m) at times between those at t: linear, orientations by slerp."""
+    """Return rows (K, 7 + m) at times: positions linear, orientations by slerp."""
     k = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     share = ((times - t[k]) / (t[k + 1] - t[k]))[:, None]
     found: Array = (1.0 - share) * rows[k] + share * rows[k + 1]
     first, last = rows[k, 3:7], rows[k + 1, 3:7]
-    # Below 90°, as each is on the side of the one before.
+    # Below 90°, as consecutive quaternions have the nearer sign.
     apart, together = (
         np.linalg.norm(each, axis=1, keepdims=True) for each in (first - last, first + last)
     )
     angle = 2.0 * np.arctan2(apart, together)
     sine = np.sin(angle)
-    near = sine < _SMALL
+    near = sine < _SMALL_SINE
     sine = np.where(near, 1.0, sine)
     one, other = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
     turned = np.where(near, found[:, 3:7], one * first + other * last)
@@ -398,27 +403,27 @@ def straight(times: Array, t: Array, rows: Array) -> Array:
     return found
 
 
-def fastest_between(t: Array, places: Array, turns: Array) -> tuple[float, float]:
-    """Return how fast the tool moves and turns at most by timed poses [m/s, rad/s].
+def fastest_between(t: Array, positions: Array, quaternions: Array) -> tuple[float, float]:
+    """Return the largest linear and angular speed of the tool through timed poses [m/s, rad/s].
 
-    Straight between them, or on the spline through them that begins and ends at rest.
+    By linear interpolation, and on the clamped cubic spline.
     """
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(t)
-    fast = float((np.linalg.norm(np.diff(places, axis=0), axis=1) / steps).max())
-    apart = np.linalg.norm(np.diff(turns, axis=0), axis=1)
+    fast = float((np.linalg.norm(np.diff(positions, axis=0), axis=1) / steps).max())
+    apart = np.linalg.norm(np.diff(quaternions, axis=0), axis=1)
     turning = float((4.0 * np.arcsin(np.minimum(0.5 * apart, 1.0)) / steps).max())
-    spline = CubicSpline(t, np.hstack([places, turns]), bc_type="clamped")
-    rates = spline(finer(t, _BETWEEN_POSES), 1)
+    spline = CubicSpline(t, np.hstack([positions, quaternions]), bc_type="clamped")
+    rates = spline(finer(t, _POSE_SAMPLES), 1)
     fast = max(fast, float(np.linalg.norm(rates[:, :3], axis=1).max()))
-    # A unit quaternion turns half as fast as what it stands for.
+    # The rate of a unit quaternion is half the angular speed.
     return fast, max(turning, 2.0 * float(np.linalg.norm(rates[:, 3:], axis=1).max()))
 
 
-def on_one_side(turns: Array) -> Array:
-    """Return quaternions (K, 4), each on the side of the one before."""
-    found = np.array(turns)
+def aligned_quaternions(quaternions: Array) -> Array:
+    """Return quaternions (K, 4), each with the sign that is nearer to the previous one."""
+    found = np.array(quaternions)
     for k in range(1, len(found)):
         if found[k] @ found[k - 1] < 0.0:
             found[k] *= -1.0

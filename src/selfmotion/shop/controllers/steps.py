@@ -51,7 +51,7 @@ class Arc(NamedTuple):
 
     @property
     def length(self) -> float:
-        """How long it is [m]."""
+        """Arc length [m]."""
         return self.angle * float(np.linalg.norm(self.arm))
 
     @property
@@ -83,27 +83,27 @@ def arc_through(begin: Array, via: Array, end: Array) -> Arc | None:
     return Arc(begin + away, axis, arm, angle)
 
 
-def step_lengths(places: Array, vias: Array) -> Array:
+def step_lengths(positions: Array, vias: Array) -> Array:
     """Return how long the steps between places (K + 1, 3) are, (K,) [m].
 
     Parameters
     ----------
-    places : (K + 1, 3)
+    positions : (K + 1, 3)
     vias : (K, 3)
         Where a step goes round; no numbers where it goes straight.
     """
-    found = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    found = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     for k in np.flatnonzero(np.isfinite(vias[:, 0])):
-        arc = arc_through(places[k], vias[k], places[k + 1])
+        arc = arc_through(positions[k], vias[k], positions[k + 1])
         found[k] = found[k] if arc is None else arc.length
     return np.asarray(found)
 
 
-def put_on_arcs(rows: Array, times: Array, t: Array, places: Array, vias: Array) -> None:
+def put_on_arcs(rows: Array, times: Array, t: Array, positions: Array, vias: Array) -> None:
     """Put the positions of rows (N, 3 + …) at times where steps go round, in place."""
     step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     for k in np.flatnonzero(np.isfinite(vias[:, 0])):
-        arc = arc_through(places[k], vias[k], places[k + 1])
+        arc = arc_through(positions[k], vias[k], positions[k + 1])
         here = step == k
         if arc is not None and here.any():
             rows[here, :3] = arc.at((times[here] - t[k]) / (t[k + 1] - t[k]))
@@ -139,28 +139,28 @@ class Steps(NamedTuple):
         return found
 
 
-class Places(NamedTuple):
-    """A motion at places along a segment.
+class SampledPoses(NamedTuple):
+    """A motion sampled along a segment.
 
     Attributes
     ----------
-    gone : (N,)
-        How far the tool has gone [m].
+    travel : (N,)
+        Arc length of the tool [m].
     q : (N, n)
     rows : (N, 7 + m)
         Poses and external axes.
     at : callable
-        How far the tool has gone (K,) → where it is (K, 3), in the work object.
+        Arc lengths (K,) → positions (K, 3) in the work object.
     """
 
-    gone: Array
+    travel: Array
     q: Array
     rows: Array
     at: Callable[[Array], Array]
 
     def middle(self, first: int, last: int) -> Array:
         """Return the position of the tool halfway between two places, (3,)."""
-        found: Array = self.at(0.5 * (self.gone[[first]] + self.gone[[last]]))[0]
+        found: Array = self.at(0.5 * (self.travel[[first]] + self.travel[[last]]))[0]
         return found
 
 
@@ -176,11 +176,11 @@ class Allowed(NamedTuple):
     rotation: float
     free: float
 
-    def turned(self, frames: ToolFrames, task: Task, turns: Array, facing: Array) -> Array:
+    def turned(self, frames: ToolFrames, task: Task, quaternions: Array, facing: Array) -> Array:
         """Return how much orientations (K, 4) take of what they may be off others, (K,)."""
-        whole = np.linalg.norm(frames.turned(turns, facing), axis=1)
+        whole = np.linalg.norm(frames.turned(quaternions, facing), axis=1)
         if task.tool_axes:
-            leaned = np.linalg.norm(np.cross(_axes(turns), _axes(facing)), axis=1)
+            leaned = np.linalg.norm(np.cross(_axes(quaternions), _axes(facing)), axis=1)
             return np.asarray(np.maximum(leaned / self.rotation, whole / self.free))
         return np.asarray(whole / (self.rotation if task.angular else self.free))
 
@@ -194,13 +194,13 @@ class StepSearch:
     frames : ToolFrames
     task : Task
         By whose rows the tool turns as it has to.
-    along : Places
+    along : SampledPoses
     allowed : Allowed
     """
 
     frames: ToolFrames
     task: Task
-    along: Places
+    along: SampledPoses
     allowed: Allowed
 
     def between(self, marks: list[int]) -> Steps | int:
@@ -222,8 +222,8 @@ class StepSearch:
             arc = at
             if line < last:
                 # The shortest arc has a place in between, and is one that controllers make.
-                long = self.along.gone[at] + LEAST_LENGTH
-                least = max(line + 1, at + 2, int(np.searchsorted(self.along.gone, long)))
+                long = self.along.travel[at] + LEAST_LENGTH
+                least = max(line + 1, at + 2, int(np.searchsorted(self.along.travel, long)))
                 arc = self._farthest(at, last, is_round=True, least=min(least, last))
             if max(line, arc) <= at:
                 return at
@@ -252,9 +252,9 @@ class StepSearch:
         if count < 2 or len(set(steps.round)) > 1:
             return steps
         wanted = np.linspace(
-            self.along.gone[steps.ends[0]], self.along.gone[steps.ends[-1]], count + 1
+            self.along.travel[steps.ends[0]], self.along.travel[steps.ends[-1]], count + 1
         )
-        ends = [int(np.abs(self.along.gone - each).argmin()) for each in wanted]
+        ends = [int(np.abs(self.along.travel - each).argmin()) for each in wanted]
         even = all(self._is_near(*pair, is_round=steps.round[0]) for pair in pairwise(ends))
         return Steps(ends, steps.round) if even else steps
 
@@ -267,18 +267,18 @@ class StepSearch:
     ) -> bool:
         """Whether one step from a place to another keeps near the motion."""
         part = slice(first, last + 1)
-        gone, exact = self.along.gone[part], self.along.rows[part]
-        place, _, free = (_OF_ALLOWED * each for each in self.allowed)
+        travel, exact = self.along.travel[part], self.along.rows[part]
+        position, _, free = (_OF_ALLOWED * each for each in self.allowed)
         if 2.0 * np.arccos(min(1.0, abs(float(exact[0, 3:7] @ exact[-1, 3:7])))) > _NEARLY_HALF:
             return False
-        rows = straight(gone, gone[[0, -1]], exact[[0, -1]])
+        rows = straight(travel, travel[[0, -1]], exact[[0, -1]])
         if is_round:
             via = self.along.middle(first, last)
             arc = arc_through(exact[0, :3], via, exact[-1, :3])
             if arc is None or not arc.is_meant:
                 return False
-            put_on_arcs(rows, gone, gone[[0, -1]], exact[[0, -1], :3], via[None])
-        if np.linalg.norm(rows[:, :3] - exact[:, :3], axis=1).max() > place:
+            put_on_arcs(rows, travel, travel[[0, -1]], exact[[0, -1], :3], via[None])
+        if np.linalg.norm(rows[:, :3] - exact[:, :3], axis=1).max() > position:
             return False
         if rows.shape[1] > 7 and np.abs(rows[:, 7:] - exact[:, 7:]).max() > free:
             return False
@@ -291,7 +291,7 @@ class StepSearch:
         return bool(arrived.all() and np.abs(q - self.along.q[part]).max() <= free)
 
 
-def _axes(turns: Array) -> Array:
+def _axes(quaternions: Array) -> Array:
     """Return the z axes of orientations (K, 4), (K, 3)."""
-    x, y, z, w = turns.T
+    x, y, z, w = quaternions.T
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)

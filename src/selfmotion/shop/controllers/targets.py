@@ -13,15 +13,15 @@ from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.segments import (
-    NO_MISS,
-    SURE,
+    NO_DEVIATION,
+    SAMPLING_FACTOR,
+    Deviation,
+    Deviations,
     Event,
-    Miss,
-    Misses,
     PoseSegment,
     Segment,
+    aligned_quaternions,
     finer,
-    on_one_side,
 )
 from selfmotion.shop.controllers.thinning import Operation, Section, rests
 from selfmotion.shop.controllers.tool_frames import ToolFrames
@@ -71,7 +71,7 @@ class PoseSection(Section):
     sparse: ClassVar[float] = 0.02
     fewest: ClassVar[int] = 2
 
-    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
         """See `Section.segments`.
 
         Raises
@@ -95,7 +95,7 @@ class PoseSection(Section):
             at = float(t[int(far.argmax())] - motion.t[0])
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
 
-    def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
+    def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
         """See `Section.thinned`.
 
         Raises
@@ -103,11 +103,11 @@ class PoseSection(Section):
         NotByPosesError
             There are no such poses.
         """
-        segment, miss = super().thinned(allowed)
+        segment, deviation = super().thinned(allowed)
         # More targets are looked at elsewhere: near a singular pose joints swing in between.
-        if isinstance(segment, PoseSegment) and miss.share(allowed) > 1.0:
+        if isinstance(segment, PoseSegment) and deviation.share(allowed) > 1.0:
             raise self._singular(self.first, allowed)
-        return segment, miss
+        return segment, deviation
 
     def _within(self, allowed: Tolerance, fixed: Array) -> Array:
         """See `Section._within`.
@@ -152,9 +152,9 @@ class PoseSection(Section):
             return segment
         motion = self.operation.motion
         exact = motion(np.minimum(self.first + segment.t, self.last))
-        places, turns = self.rounding(*self.frames.places(exact))
+        positions, quaternions = self.rounding(*self.frames.tool_poses(exact))
         # External axes in their digits, the arm's joints as they follow.
-        q, arrived = self.frames.solved(places, turns, self._mixed(exact, segment.q))
+        q, arrived = self.frames.solved(positions, quaternions, self._mixed(exact, segment.q))
         if not arrived.all():
             at = float(t[int(np.argmin(arrived))])
             raise NotByPosesError(
@@ -166,8 +166,8 @@ class PoseSection(Section):
             segment.t,
             q,
             events,
-            places=places,
-            turns=on_one_side(turns),
+            positions=positions,
+            quaternions=aligned_quaternions(quaternions),
             frames=self.frames,
             near=lambda times: motion(np.minimum(self.first + times, self.last)),
             order=np.arange(q.shape[1]),
@@ -198,7 +198,7 @@ class PoseSection(Section):
                 angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
                 off = np.maximum(off, angle / allowed.rotation)
                 worst = np.maximum(worst, largest(off, count))
-        return np.where(np.isfinite(worst), SURE * worst, np.inf)
+        return np.where(np.isfinite(worst), SAMPLING_FACTOR * worst, np.inf)
 
     @override
     def bend(self, t: Array, allowed: Tolerance) -> Array:
@@ -206,13 +206,13 @@ class PoseSection(Section):
         motion = self.operation.motion
         middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
         q = [motion(middle + side * _AROUND) for side in (-1.0, 0.0, 1.0)]
-        poses = [self.frames.places(each) for each in q]
-        places = (poses[0][0] - 2.0 * poses[1][0] + poses[2][0]) / _AROUND**2
-        turns = [self.frames.turned(poses[k][1], poses[k + 1][1]) for k in (0, 1)]
-        turned = (turns[1] - turns[0]) / _AROUND**2
-        joints = self.frames.joint_rates(q[1], np.hstack([places, turned]))
+        poses = [self.frames.tool_poses(each) for each in q]
+        positions = (poses[0][0] - 2.0 * poses[1][0] + poses[2][0]) / _AROUND**2
+        quaternions = [self.frames.turned(poses[k][1], poses[k + 1][1]) for k in (0, 1)]
+        turned = (quaternions[1] - quaternions[0]) / _AROUND**2
+        joints = self.frames.joint_rates(q[1], np.hstack([positions, turned]))
         others = ((q[0] - 2.0 * q[1] + q[2]) / _AROUND**2)[:, self.frames.external]
-        found: Array = np.linalg.norm(places, axis=1) / allowed.position
+        found: Array = np.linalg.norm(positions, axis=1) / allowed.position
         for rates in (
             np.linalg.norm(turned, axis=1, keepdims=True),
             np.abs(joints),
@@ -260,7 +260,7 @@ def segments_of(
     of_moves: Tolerance | None = None,
     progress: Progress = silent,
     posed: PosedSections | None = None,
-) -> tuple[list[Segment], Misses]:
+) -> tuple[list[Segment], Deviations]:
     """Return the targets of a motion, as its file has them, and how far they are off it.
 
     Moves through the air may be off by `of_moves`; by default as far as they keep apart. With
@@ -274,7 +274,7 @@ def segments_of(
         It does not begin and end at rest, or takes more targets than any controller has.
     """
     found: list[Segment] = []
-    worst = Misses(NO_MISS, NO_MISS)
+    worst = Deviations(NO_DEVIATION, NO_DEVIATION)
     for k, operation in enumerate(operations):
         progress("targets", k + 1, len(operations))
         motion = operation.motion
@@ -288,8 +288,12 @@ def segments_of(
                 )
         within = _allowed(operation, allowed, of_moves)
         for first, last in _moving(motion, [motion.t[0] + at for at, _ in operation.events]):
-            for segment, miss in _thinned(operation, slides, first, last, within, posed):
-                both = Misses(NO_MISS, miss) if operation.is_move else Misses(miss, NO_MISS)
+            for segment, deviation in _thinned(operation, slides, first, last, within, posed):
+                both = (
+                    Deviations(NO_DEVIATION, deviation)
+                    if operation.is_move
+                    else Deviations(deviation, NO_DEVIATION)
+                )
                 worst = worst.worse(both)
                 found.append(segment)
     return found, worst
@@ -302,7 +306,7 @@ def _thinned(
     last: float,
     within: Tolerance,
     posed: PosedSections | None,
-) -> list[tuple[Segment, Miss]]:
+) -> list[tuple[Segment, Deviation]]:
     if posed is not None:
         try:
             return posed(operation, slides, first, last).segments(within)

@@ -23,12 +23,12 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.segments import (
-    NO_MISS,
+    NO_DEVIATION,
+    Deviation,
     Event,
-    Miss,
     Segment,
-    miss_between,
-    miss_of,
+    deviation_between,
+    deviation_of,
 )
 from selfmotion.work.job import Program
 
@@ -46,8 +46,8 @@ class Operation(NamedTuple):
     Of a move through the air also how far a controller may be off it, where there is room; of a
     seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
     have [rad/s or m/s]. `keeps` says whether another motion keeps all that a seam's has to but
-    accelerations, within a tolerance; `turns` is the task by whose rows its tool turns as it has
-    to, but for relaxed ones, and `tool_rests` when that rests on its way [s].
+    accelerations, within a tolerance; `rotation_task` is the task whose rows prescribe the
+    tool's rotation, but for relaxed ones; `tool_rests` are the times at which the tool rests [s].
     """
 
     name: str
@@ -59,7 +59,7 @@ class Operation(NamedTuple):
     feeds: tuple[tuple[FeedKept, ...], ...] = ()
     speeds: Array | None = None
     keeps: Callable[[Trajectory, Tolerance], bool] | None = None
-    turns: Task = Task.POSE
+    rotation_task: Task = Task.POSE
     tool_rests: tuple[float, ...] = ()
 
 
@@ -104,7 +104,7 @@ def _of_plan(name: str, plan: Plan) -> Operation:
         return by_targets(plan.problem).certify(motion, within).verified
 
     relaxed = {row for item in plan.problem.relaxations for row in item.rows}
-    turns = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
+    rotation_task = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
     return Operation(
         name,
         plan.trajectory,
@@ -113,7 +113,7 @@ def _of_plan(name: str, plan: Plan) -> Operation:
         feeds=feeds,
         speeds=speeds,
         keeps=keeps,
-        turns=turns,
+        rotation_task=rotation_task,
         tool_rests=_rests_of(plan.problem.path),
     )
 
@@ -127,16 +127,16 @@ def _rests_of(path: Path) -> tuple[float, ...]:
 
 def by_targets(problem: Problem) -> Problem:
     """Return a problem with the constraints that targets can keep."""
-    return replace(problem, constraints=what_targets_keep(problem.constraints))
+    return replace(problem, constraints=constraints_of_targets(problem.constraints))
 
 
-def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+def constraints_of_targets(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that targets can keep: accelerations are the controller's own."""
     own = (JointAccelerationLimits, JointJerkLimits)
     return tuple(item for item in constraints if not isinstance(item, own))
 
 
-def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+def constraints_of_lines(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that straight lines can keep: corners have no acceleration.
 
     Nor torques, then, which are judged along the smooth curve.
@@ -145,7 +145,7 @@ def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]
         replace(item, acceleration=np.inf, turn_acceleration=np.inf)
         if isinstance(item, ToolLimits)
         else item
-        for item in what_targets_keep(constraints)
+        for item in constraints_of_targets(constraints)
         if not isinstance(item, JointTorqueLimits)
     )
 
@@ -252,7 +252,7 @@ class Section:
             and (self.last == end or start + at <= self.last)
         ]
 
-    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
         """Return its segments: one, or several if the tool rests in between.
 
         Raises
@@ -262,7 +262,7 @@ class Section:
         """
         return [self.thinned(allowed)]
 
-    def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
+    def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
         """Return the segment of its targets, and their deviation.
 
         Raises
@@ -272,12 +272,12 @@ class Section:
         """
         fixed = _apart(self.first, self.last, [at for at, _ in self.events])
         if rests(self.operation.motion, self.first, self.last):
-            return self._passing(fixed, at_rest=True), NO_MISS
+            return self._passing(fixed, at_rest=True), NO_DEVIATION
         self._check_digits(allowed)
         t = self._within(allowed, fixed)
         for _ in range(_TRIES):
             segment = self._passing(t)
-            missed = self._missed(segment)
+            missed = self._too_far(segment)
             if not missed.any():
                 break
             # With their neighbours, so that steps do not differ much.
@@ -286,21 +286,21 @@ class Section:
             if not near.any():
                 break
             t = np.sort(np.append(t, 0.5 * (t[1:] + t[:-1])[near]))
-        return segment, self._miss(segment)
+        return segment, self._deviation(segment)
 
     def _within(self, allowed: Tolerance, fixed: Array) -> Array:
         """Return times of targets that keep the tool and the joints near the motion."""
         more = 1.0
         for _ in range(_TRIES):
             t = self.spread(fixed, allowed, more)
-            miss = self._miss(self._passing(t))
-            if miss.share(allowed) <= 1.0:
+            deviation = self._deviation(self._passing(t))
+            if deviation.share(allowed) <= 1.0:
                 return t
-            more *= max(1.05, 1.02 * float(np.sqrt(miss.share(allowed))))
+            more *= max(1.05, 1.02 * float(np.sqrt(deviation.share(allowed))))
         raise ProblemError(
-            f"'{self.operation.name}' is off by {1e3 * miss.position:.3g} mm and "
-            f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more "
-            f"than {_in_words(self.operation, allowed)}"
+            f"'{self.operation.name}' is off by {1e3 * deviation.position:.3g} mm and "
+            f"{np.degrees(max(deviation.rotation, deviation.joint)):.3g}° with {len(t)} targets; "
+            f"allow more than {_in_words(self.operation, allowed)}"
         )
 
     def spread(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
@@ -347,8 +347,8 @@ class Section:
         events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
         return Segment(self.operation.name, offset, q, tuple(events))
 
-    def _miss(self, segment: Segment) -> Miss:
-        return miss_of(segment, self.operation.motion, self.operation.chains, self.first)
+    def _deviation(self, segment: Segment) -> Deviation:
+        return deviation_of(segment, self.operation.motion, self.operation.chains, self.first)
 
     def _in_digits(self, q: Array) -> Array:
         """Return coordinates [rad or m] as they are when their digits in a file are read again."""
@@ -358,16 +358,16 @@ class Section:
     def _check_digits(self, allowed: Tolerance) -> None:
         """Refuse what no number of targets keeps, as they have few digits."""
         q = self.operation.motion.q
-        miss = miss_between(self._in_digits(q), q, self.operation.chains)
-        if miss.share(allowed) > 1.0:
+        deviation = deviation_between(self._in_digits(q), q, self.operation.chains)
+        if deviation.share(allowed) > 1.0:
             raise ProblemError(
                 f"'{self.operation.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, "
-                f"which is up to {1e3 * miss.position:.2g} mm and "
-                f"{np.degrees(miss.rotation):.2g}° of the tool; allow more than "
+                f"which is up to {1e3 * deviation.position:.2g} mm and "
+                f"{np.degrees(deviation.rotation):.2g}° of the tool; allow more than "
                 f"{_in_words(self.operation, allowed)}"
             )
 
-    def _missed(self, segment: Segment) -> Flags:
+    def _too_far(self, segment: Segment) -> Flags:
         """Whether a feed is missed, or a limit of speed passed, between two targets (K,).
 
         Where the motion itself does not; on the spline through the targets and straight between

@@ -169,7 +169,7 @@ class ToolFrames:
             return f"joints of {name} mimic others"
         return ""
 
-    def places(self, q: Array) -> tuple[Array, Array]:
+    def tool_poses(self, q: Array) -> tuple[Array, Array]:
         """Return the tool in the work object at q (K, n): positions (K, 3), quaternions (K, 4).
 
         Quaternions are x, y, z, w.
@@ -177,20 +177,20 @@ class ToolFrames:
         from scipy.spatial.transform import Rotation
 
         _, rotations, translations = self._tool_along(q)
-        turn = np.asarray(self.work.rotation)
-        places = (translations - self.work.translation) @ turn
-        return places, Rotation.from_matrix(turn.T @ rotations).as_quat()
+        rotation = np.asarray(self.work.rotation)
+        positions = (translations - self.work.translation) @ rotation
+        return positions, Rotation.from_matrix(rotation.T @ rotations).as_quat()
 
-    def solved(self, places: Array, turns: Array, near: Array) -> tuple[Array, Flags]:
+    def solved(self, positions: Array, quaternions: Array, near: Array) -> tuple[Array, Flags]:
         """Return q (K, n) for tool poses, from near ones, whose external axes stay; and where.
 
         The second is whether Newton's method arrived, (K,).
         """
         from scipy.spatial.transform import Rotation
 
-        turn = np.asarray(self.work.rotation)
-        wanted = places @ turn.T + self.work.translation
-        facing = turn @ Rotation.from_quat(turns).as_matrix()
+        rotation = np.asarray(self.work.rotation)
+        wanted = positions @ rotation.T + self.work.translation
+        facing = rotation @ Rotation.from_quat(quaternions).as_matrix()
         q = np.array(near)
         for _ in range(_STEPS):
             jacobian, rotations, translations = self._tool_along(q)
@@ -206,8 +206,8 @@ class ToolFrames:
 
     def joint_rates(self, q: Array, rates: Array) -> Array:
         """Return rates of the tool in the work object (K, 6) as rates of the arm's joints."""
-        turn = np.asarray(self.work.rotation)
-        turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
+        rotation = np.asarray(self.work.rotation)
+        turned = np.hstack([rates[:, :3] @ rotation.T, rates[:, 3:] @ rotation.T])
         return self._rates(self._tool_along(q)[0], turned)
 
     def regularity(self, q: Array) -> Array:
@@ -240,11 +240,11 @@ class ToolFrames:
     def rounded(self, rounding: Rounding) -> "ToolFrames":
         """Return the frames with work object and tool rounded as in files."""
         poses = (self.work, self.tool)
-        turns = np.array([Quaternion(pose.rotation).coeffs() for pose in poses])
-        places, turned = rounding(np.array([pose.translation for pose in poses]), turns)
+        quaternions = np.array([Quaternion(pose.rotation).coeffs() for pose in poses])
+        positions, turned = rounding(np.array([pose.translation for pose in poses]), quaternions)
         both = (
-            SE3(Quaternion(turn).toRotationMatrix(), place)
-            for place, turn in zip(places, turned, strict=True)
+            SE3(Quaternion(quaternion).toRotationMatrix(), position)
+            for position, quaternion in zip(positions, turned, strict=True)
         )
         work, tool = both
         return replace(self, work=work, tool=tool)
@@ -286,13 +286,13 @@ def turned_base(robot: RobotModel) -> str:
     base = base_of(robot)
     if base == WORLD:
         return ""
-    place = robot.chain_to(base).place(np.zeros(robot.dof))
-    turn = float(np.linalg.norm(log3(place.rotation)))
-    if turn < _TURNED:
+    pose = robot.chain_to(base).place(np.zeros(robot.dof))
+    angle = float(np.linalg.norm(log3(pose.rotation)))
+    if angle < _TURNED:
         return ""
     return (
         f"work objects are counted in '{base}', the controller's frame, which is turned by "
-        f"{np.degrees(turn):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
+        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
         f"{OF_PATH} is the frame of the path"
     )
 
@@ -360,5 +360,5 @@ def _turned(rotations: Array, wanted: Array) -> Array:
     """Return the rotation vectors from orientations to wanted ones, (K, 3)."""
     from scipy.spatial.transform import Rotation
 
-    turns: Array = Rotation.from_matrix(wanted @ rotations.transpose(0, 2, 1)).as_rotvec()
-    return turns
+    vectors: Array = Rotation.from_matrix(wanted @ rotations.transpose(0, 2, 1)).as_rotvec()
+    return vectors

@@ -19,7 +19,7 @@ from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings
 from selfmotion.shop.controllers.program_texts import pin_values
 from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
-from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
+from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.statements import (
     Field,
@@ -77,13 +77,13 @@ def _read_axes(reader: ProgramReader, text: str) -> list[float]:
 
 
 def _read_pose(reader: ProgramReader, text: str) -> Pose:
-    place, turn = urscript_pose(np.array(_six(reader, text)))
-    return Pose(place, turn, [], reader.lines.number)
+    position, quaternion = urscript_pose(np.array(_six(reader, text)))
+    return Pose(position, quaternion, [], reader.lines.number)
 
 
 def _read_frame(reader: ProgramReader, text: str) -> SE3:
-    place, turn = urscript_pose(np.array(_six(reader, text)))
-    return pose_of_values([*place.tolist(), *turn.tolist()])
+    position, quaternion = urscript_pose(np.array(_six(reader, text)))
+    return pose_of_values([*position.tolist(), *quaternion.tolist()])
 
 
 def _write_numbers(values: Sequence[float]) -> str:
@@ -95,7 +95,7 @@ def _write_exactly(values: Array) -> str:
 
 
 def _write_pose(pose: WrittenPose) -> str:
-    numbers = urscript_numbers(pose.place, pose.turn)
+    numbers = urscript_numbers(pose.position, pose.quaternion)
     return f"pose_trans(feature, p{_write_numbers(numbers)})"
 
 
@@ -248,13 +248,13 @@ class UrscriptWriter(ProgramWriter):
     def _blends(self, segment: Segment) -> Array:
         """Return the radius of the blend at each target [m]; without one the arm stops there."""
         if isinstance(segment, PoseSegment):
-            places = segment.places
+            positions = segment.positions
         else:
             order = [
                 self.draft.robot.joint_names.index(axis.joint) for axis in self.draft.program.axes
             ]
-            places = self.draft.robot.chain.along(segment.q[:, np.argsort(order)])[2]
-        lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+            positions = self.draft.robot.chain.along(segment.q[:, np.argsort(order)])[2]
+        lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         radii = np.zeros(len(segment.t))
         most = ZONE if isinstance(segment, FeedSegment) else _BLEND
         radii[1:-1] = np.clip(_SHARE * np.minimum(lengths[:-1], lengths[1:]), _LEAST, most)
@@ -346,9 +346,9 @@ class UrscriptReader(ProgramReader):
         Where no arm is known, those that are larger than any that is written.
         """
         radii, self._blends = np.array(self._blends[:-1]), []
-        most, places = np.full(len(radii), _BLEND), self._places()
-        if places is not None:
-            lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        most, positions = np.full(len(radii), _BLEND), self._places()
+        if positions is not None:
+            lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
             most = np.maximum(0.5 * np.minimum(lengths[:-1], lengths[1:]), _LEAST)
         far = (radii > most) | (radii < 0.0)
         if far.any():
@@ -361,7 +361,7 @@ class UrscriptReader(ProgramReader):
     def _places(self) -> Array | None:
         """Return positions of the tool at the last stop and since, (K + 1, 3); None if unknown."""
         targets = [self.here, *(target.at for target in self.run)]
-        poses = [at.place for at in targets if isinstance(at, Pose)]
+        poses = [at.position for at in targets if isinstance(at, Pose)]
         axes = [at for at in targets if isinstance(at, list)]
         if len(poses) == len(targets):
             return np.array(poses)

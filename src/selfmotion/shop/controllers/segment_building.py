@@ -1,4 +1,4 @@
-"""Rows of targets as a file has them, made into segments; poses by inverse kinematics."""
+"""Segments built from the targets of a file; joints of tool poses by inverse kinematics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,57 +10,77 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
 from selfmotion.shop.controllers.feed_segments import FeedSegment, times_at
 from selfmotion.shop.controllers.program_settings import Axis, ProgramSettings, tool_from_flange
-from selfmotion.shop.controllers.segments import PoseSegment, Segment, finer, on_one_side, straight
+from selfmotion.shop.controllers.segments import (
+    PoseSegment,
+    Segment,
+    aligned_quaternions,
+    finer,
+    straight,
+)
 from selfmotion.shop.controllers.steps import put_on_arcs
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# Name in messages of slow motions to where a shifted program goes on.
-_SLOWLY = "a slow motion"
-# Length below which a slow motion takes no time: rounding of digits [rad or m].
-_THERE = 1e-5
-# Speed of slow motions in shifted files: only their path is read [m/s, rad/s].
-_SLOW = 0.05
-# Number of poses between two targets at which inverse kinematics is solved.
-_BETWEEN = 16
-# Step of a joint above which poses are solved one after another [rad].
-_STEP = 0.2
-# Step of a joint that is a jump to another branch [rad].
+# Name in messages of inserted slow motions between the segments of a shifted program.
+_SLOW_NAME = "a slow motion"
+# Distance below which a slow motion is omitted: rounding of digits [rad or m].
+_SAME_PLACE = 1e-5
+# Assumed speed of slow motions, of which only the path matters [m/s, rad/s].
+_SLOW_SPEED = 0.05
+# Shortest duration of a slow motion to a pose [s].
+_SHORTEST = 0.1
+# Inverse kinematics is solved at so many poses per interval between two targets.
+_SAMPLES = 16
+# The same of an interval at a speed, as a multiple.
+_SAMPLES_AT_SPEED = 8
+# Joint step above which poses are solved one after another, each from the previous one [rad].
+_LARGE_STEP = 0.2
+# Joint step that is a jump to another branch of the inverse kinematics [rad].
 _JUMP = 0.5
-# Factor of that number for steps at speeds.
-_FINER = 8
 
 
 @dataclass
 class Pose:
-    """A tool pose of a file: position [m], quaternion x, y, z, w, external axes [deg or mm]."""
+    """A tool pose of a file.
 
-    place: Array
-    turn: Array
-    others: list[float]
+    Attributes
+    ----------
+    position : (3,)
+        [m]
+    quaternion : (4,)
+        x, y, z, w.
+    external : list of float
+        External axes [deg or mm].
+    line : int
+        Line of the file.
+    """
+
+    position: Array
+    quaternion: Array
+    external: list[float]
     line: int
 
 
 @dataclass
 class Row:
-    """A motion from rest to rest while it is read, a rest, or a slow motion.
+    """A motion from rest to rest as a file has it, a pause, or an inserted slow motion.
 
     Attributes
     ----------
     name : str
-        Of the seam or move.
+        Name of the seam or move.
     targets : list
-        Where it begins, and its targets: axes [deg or mm], or poses. None for a rest; of a slow
-        motion where it ends alone.
+        Initial target and further ones: axes [deg or mm], or poses. Empty for a pause; of a slow
+        motion the last one only.
     seconds : list of float
-        Times between targets [s]; of a motion at speeds the one that was planned for all of it.
+        Durations between targets [s]; of a motion at speeds its planned duration.
     speeds : list of float
-        Speed of each step [m/s]; none for times.
+        Speed of each step [m/s]; empty for steps with durations.
     vias : (K, 3)
-        Point of each circular step [m]; no numbers for straight ones.
+        Via point of each circular step [m]; NaN for linear steps.
     is_spline : bool
-        Whether it goes smoothly through its targets, not straight between them.
+        Whether the targets are joined by a spline, not by lines.
     is_slow : bool
-        Whether it goes slowly to where the next motion begins.
+        Whether it is a slow motion to the beginning of the next one.
     """
 
     name: str
@@ -73,16 +93,16 @@ class Row:
 
     @property
     def poses(self) -> list[Pose]:
-        """Targets that are poses: all of them, or none."""
+        """All targets where they are poses, else an empty list."""
         return [target for target in self.targets if isinstance(target, Pose)]
 
     @property
     def axes(self) -> list[list[float]]:
-        """Targets that are axes: all of them, or none."""
+        """All targets where they are axes, else an empty list."""
         return [target for target in self.targets if not isinstance(target, Pose)]
 
     def with_axes(self, columns: Sequence[int]) -> "Row":
-        """Return it with some of the axes of its targets."""
+        """Return the row with a selection of the axes of its targets."""
         targets = [
             target if isinstance(target, Pose) else [target[k] for k in columns]
             for target in self.targets
@@ -91,10 +111,11 @@ class Row:
 
 
 @dataclass
-class Places:
-    """The frames of a file: the tool in the flange, the work object in its carrier.
+class ProgramFrames:
+    """Frames of a file: the tool relative to the flange, the work object relative to its carrier.
 
-    And whether it says that an axis carries the work object; None where it does not say.
+    `is_carried` is whether the file states that an axis carries the work object; None where it
+    states neither.
     """
 
     carrier: str = ""
@@ -107,20 +128,20 @@ class Places:
 
     @property
     def shift(self) -> SE3 | None:
-        """By how much the work object is elsewhere than planned; None for not at all."""
+        """Displacement of the work object from its planned pose; None for none."""
         if self.planned is None or self.work is None:
             return None
         shift = self.work * self.planned.inverse()
-        is_same = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
+        is_same = np.abs(shift.homogeneous - np.eye(4)).max() < _ROUNDING
         return None if is_same else shift
 
     def frames(self, robot: RobotModel, axes: Sequence[Axis], file: object) -> ToolFrames:
-        """Return the frames for a robot whose joints the axes are.
+        """Return the tool frames of a robot with these axes.
 
         Raises
         ------
         FileFormatError
-            The file does not say enough, or says what the robot has not.
+            A frame is missing in the file, or does not fit the robot.
         """
         by_joint = {axis.joint: axis for axis in axes}
         if sorted(by_joint) != sorted(robot.joint_names):
@@ -153,13 +174,13 @@ class Places:
         return found
 
 
-# Digits of poses leave this [m, parts of a turn].
-_REST = 2e-6
+# Rounding of poses to the digits of files [m, elements of a rotation].
+_ROUNDING = 2e-6
 
 
 @dataclass
-class Follower:
-    """Makes segments of rows, one after the other, from where the arm is.
+class SegmentBuilder:
+    """Builds segments from rows in sequence, each from the final configuration of the last.
 
     Parameters
     ----------
@@ -167,13 +188,13 @@ class Follower:
     axes : tuple of Axis
         In the order of the file.
     frames : ToolFrames or None
-        None where there are no poses.
+        None where the file has no poses.
     segments : list of Segment
-        What is made so far.
+        Segments so far.
     at : (n,) or None
-        Where the arm is.
+        Current configuration.
     approach : float
-        How far it goes slowly from its first axis target to its first pose [rad or m].
+        Joint distance from the first axis target to the first pose [rad or m].
     """
 
     file: object
@@ -183,16 +204,16 @@ class Follower:
     at: Array | None = None
     approach: float = 0.0
 
-    def take(self, row: Row) -> None:
-        """Take a row.
+    def add(self, row: Row) -> None:
+        """Add the segment of a row.
 
         Raises
         ------
         FileFormatError
-            The arm cannot follow it.
+            Inverse kinematics has no continuous solution along it.
         """
         if row.is_slow:
-            self._slowly(row)
+            self._add_slow_motion(row)
             return
         if row.poses:
             segment: Segment = self._segment(row)
@@ -211,26 +232,26 @@ class Follower:
         axes = self.axes if columns is None else [self.axes[k] for k in columns]
         return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
 
-    def _slowly(self, row: Row) -> None:
+    def _add_slow_motion(self, row: Row) -> None:
         before, (target,) = self.at, row.targets
         if not isinstance(target, Pose):
             self.at = self.in_si(np.array(target, dtype=np.float64))
-            if before is not None and np.abs(self.at - before).max() > _THERE:
-                seconds = float(np.abs(self.at - before).max()) / _SLOW
+            if before is not None and np.abs(self.at - before).max() > _SAME_PLACE:
+                seconds = float(np.abs(self.at - before).max()) / _SLOW_SPEED
                 both = np.array([before, self.at])
-                self.segments.append(Segment(_SLOWLY, times_of([seconds]), both, is_slow=True))
+                self.segments.append(Segment(_SLOW_NAME, times_of([seconds]), both, is_slow=True))
             return
-        frames, _ = self._known()
+        frames, _ = self._frames_and_order()
         if before is None:
             raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
-        place, turn = frames.places(self._by_robot(before[None]))
-        far = float(np.linalg.norm(place[0] - target.place))
-        angle = float(np.linalg.norm(frames.turned(turn, target.turn[None])))
+        position, quaternion = frames.tool_poses(self._by_robot(before[None]))
+        far = float(np.linalg.norm(position[0] - target.position))
+        angle = float(np.linalg.norm(frames.turned(quaternion, target.quaternion[None])))
         # Slowly from where the arm is, however far that is.
-        seconds = max(far / _SLOW, angle / _SLOW, 0.1)
-        moves = bool(self.segments) and max(far, angle) > _THERE
-        here = Pose(place[0], turn[0], self._others(before), target.line)
-        found = self._segment(Row(_SLOWLY, [here, target], [seconds]))
+        seconds = max(far / _SLOW_SPEED, angle / _SLOW_SPEED, _SHORTEST)
+        moves = bool(self.segments) and max(far, angle) > _SAME_PLACE
+        here = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
+        found = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
         segment = replace(found, is_slow=True)
         if not self.segments:
             self.approach = float(np.abs(segment.q[-1] - before).max())
@@ -239,28 +260,29 @@ class Follower:
         self.at = segment.q[-1]
 
     def _segment(self, row: Row) -> PoseSegment:
-        """Return the segment of poses, its joints followed from where the arm is."""
-        frames, order = self._known()
-        places = np.array([pose.place for pose in row.poses])
+        """Return the segment of poses, with joints by inverse kinematics from the current ones."""
+        frames, order = self._frames_and_order()
+        positions = np.array([pose.position for pose in row.poses])
         at_speeds = bool(row.speeds)
-        t = times_at(places, row.vias, row.speeds) if at_speeds else times_of(row.seconds)
-        turns = on_one_side(np.array([pose.turn for pose in row.poses]))
-        outer = [k for k, axis in enumerate(self.axes) if axis.name.startswith("E")]
-        if any(len(pose.others) != len(outer) for pose in row.poses):
+        t = times_at(positions, row.vias, row.speeds) if at_speeds else times_of(row.seconds)
+        quaternions = aligned_quaternions(np.array([pose.quaternion for pose in row.poses]))
+        externals = [k for k, axis in enumerate(self.axes) if axis.name.startswith("E")]
+        if any(len(pose.external) != len(externals) for pose in row.poses):
             raise FileFormatError(f"{self.file}: poses have axes that its comments do not name")
-        others = self.in_si(np.array([pose.others for pose in row.poses]), outer)
-        # In the robot's order, as frames have them.
-        in_file = {self.axes[k].joint: c for c, k in enumerate(outer)}
+        external = self.in_si(np.array([pose.external for pose in row.poses]), externals)
+        # In the robot's order, as in ToolFrames.
+        in_file = {self.axes[k].joint: c for c, k in enumerate(externals)}
         columns = [in_file[frames.axes[k].joint] for k in frames.external.tolist()]
-        others = others[:, columns]
-        # Steps at speeds may be as long as the segment.
-        count = _BETWEEN * (_FINER if at_speeds else 1)
+        external = external[:, columns]
+        # A step at a speed may be the whole segment.
+        count = _SAMPLES * (_SAMPLES_AT_SPEED if at_speeds else 1)
         times = finer(t, np.linspace(0.0, 1.0, count, endpoint=False))
-        rows = straight(times, t, np.hstack([places, turns, others]))
+        rows = straight(times, t, np.hstack([positions, quaternions, external]))
         if at_speeds:
-            put_on_arcs(rows, times, t, places, row.vias)
-        assert self.at is not None
-        q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row, count)
+            put_on_arcs(rows, times, t, positions, row.vias)
+        if self.at is None:
+            raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
+        q = self._inverse_kinematics(frames, rows, self._by_robot(self.at[None])[0], row, count)
         every = q[np.arange(0, len(times), count)]
 
         def near(wanted: Array) -> Array:
@@ -270,8 +292,8 @@ class Follower:
             row.name,
             t,
             every,
-            places=places,
-            turns=turns,
+            positions=positions,
+            quaternions=quaternions,
             frames=frames,
             near=near,
             order=np.arange(every.shape[1]),
@@ -287,23 +309,26 @@ class Follower:
             )
         return segment.in_order(order)
 
-    def _followed(
+    def _inverse_kinematics(
         self, frames: ToolFrames, rows: Array, first: Array, row: Row, count: int
     ) -> Array:
-        """Return the robot's joints along poses: from one target to the next at once, if they join.
+        """Return the robot's joints along poses, of which there are `count` per interval.
 
-        Else each found from the one before. From one target to the next are `count` poses.
+        A block of poses is solved at once; where that is not continuous, one pose after another.
         """
         found = np.empty((len(rows), len(first)))
         at = np.array(first)
-        for k in range(0, len(rows), _BETWEEN):
-            block = rows[k : k + _BETWEEN]
+        for k in range(0, len(rows), _SAMPLES):
+            block = rows[k : k + _SAMPLES]
             q, arrived = self._solved(frames, block, at)
             steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
-            # The arm may be somewhere else before its first pose: of a shifted work object.
-            if not arrived.all() or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _STEP:
-                q = self._one_by_one(frames, block, at, row, (k, count))
-            found[k : k + _BETWEEN] = q
+            # The arm may be elsewhere before its first pose: of a shifted work object.
+            if (
+                not arrived.all()
+                or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _LARGE_STEP
+            ):
+                q = self._sequential(frames, block, at, row, (k, count))
+            found[k : k + _SAMPLES] = q
             at = q[-1]
         return found
 
@@ -312,10 +337,10 @@ class Follower:
         seeds[:, frames.external] = poses[:, 7:]
         return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
 
-    def _one_by_one(
-        self, frames: ToolFrames, poses: Array, at: Array, row: Row, place: tuple[int, int]
+    def _sequential(
+        self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]
     ) -> Array:
-        found, (first, count) = np.empty((len(poses), len(at))), place
+        found, (first, count) = np.empty((len(poses), len(at))), position
         for k, pose in enumerate(poses, first):
             q, arrived = self._solved(frames, pose[None], at)
             far = np.abs(q[0] - at)[frames.arm].max()
@@ -328,18 +353,18 @@ class Follower:
             found[k - first] = at = q[0]
         return found
 
-    def _known(self) -> tuple[ToolFrames, list[int]]:
-        """Return the frames, and which of the robot's joints each axis of the file is."""
+    def _frames_and_order(self) -> tuple[ToolFrames, list[int]]:
+        """Return the tool frames, and the index of the robot's joint for each axis of the file."""
         if self.frames is None:
             raise FileFormatError(f"{self.file}: has poses, whose joint positions need the robot")
         names = self.frames.robot.joint_names
         return self.frames, [names.index(axis.joint) for axis in self.axes]
 
     def _by_robot(self, q: Array) -> Array:
-        _, order = self._known()
+        _, order = self._frames_and_order()
         return q[:, np.argsort(order)]
 
-    def _others(self, q: Array) -> list[float]:
+    def _external_axes(self, q: Array) -> list[float]:
         """Return the external axes of joints in the file's order [deg, mm]."""
         return [
             float(value) * (1e3 if axis.slides else 180.0 / np.pi)
@@ -349,13 +374,13 @@ class Follower:
 
 
 def times_of(seconds: Sequence[float]) -> Array:
-    """Return when targets are reached, of times between them, in whole microseconds."""
+    """Return the times of targets from the durations between them, in whole microseconds [s]."""
     return np.round(np.append(0.0, np.cumsum(seconds)), 6)
 
 
 def pose_of_values(values: Sequence[float]) -> SE3:
-    """Return a pose of position [m] and quaternion x, y, z, w."""
+    """Return a pose from position [m] and quaternion x, y, z, w."""
     x, y, z, w = values[3:7]
-    turn = Quaternion(w, x, y, z)
-    turn.normalize()
-    return SE3(turn.toRotationMatrix(), np.array(values[:3]))
+    quaternion = Quaternion(w, x, y, z)
+    quaternion.normalize()
+    return SE3(quaternion.toRotationMatrix(), np.array(values[:3]))
