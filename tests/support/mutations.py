@@ -90,6 +90,10 @@ _OTHERS = (
      '0], "yaxis": [0, -1, 0]}, "velocity": 25, "extruder_toggle": false}}}}'),
     (".cls", "MSYS/0,0,0,1,0,0,0,1,0\nRAPID\nGOTO/0,0,20,0,0,1\nFEDRAT/MMPM,600\nGOTO/0,0,0\nMSYS/"
      "9,0,0,0,1,0,-1,0,0\nOFSTNO/1\nINSERT M8\nGOTO/40,0,0\nRAPID\nGOTO/40,0,20\n"),
+    (".csv", "x;y;z;rz1;ry;rz2;velocity\n0;0;0;0;180;0;20\n40;0;0;90;180;0;20\n"),
+    (".csv", "X 10,5; Y 0,0; Z 3,25; A 180,0\nX 30,5; Y -4,0; Z 3,25; A 180,0\n"),
+    (".json", '{"dtype": "a", "data": [{"point": [0.4, 0, 0.3], "xaxis": [1, 0, 0], "yaxis": '
+     '[0, -1, 0]}, {"point": [0.4, 0.1, 0.3], "xaxis": [1, 0, 0], "yaxis": [0, -1, 0]}]}'),
     (".mpf", "TRAORI\nG0 X=0 Y=0 Z=20 A3=0 B3=0 C3=1\nG1 X=40 Z=0 A3=0.1 B3=0 C3=0.9 F2000\n"),
 )  # fmt: skip
 _PLANAR = b"""<robot name="r"><link name="a"/><link name="b"/><joint name="p" type="planar">

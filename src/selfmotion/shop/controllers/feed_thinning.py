@@ -35,33 +35,33 @@ from selfmotion.shop.controllers.steps import (
     step_lengths,
 )
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
-from selfmotion.shop.controllers.thinning import Operation, rests
+from selfmotion.shop.controllers.thinning import Operation, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames, carrier_in_reference
 
-# Tolerances of turning and self-motion, tried in turn [rad or m]; 0: that of all other joints.
-_FREE = (0.2, 0.02, 0.0)
-# Shares of the tolerance of positions, tried in turn: corners that are cut cost feed.
-_OF_PLACES = (1.0, 0.3)
-# Smallest number of places along a segment at which it is evaluated.
-_FEWEST = 400
-# Largest number of these places.
+# Tolerances of free rotation and self-motion, tried in turn [rad or m]; 0: that of the joints.
+_FREE_TOLERANCES = (0.2, 0.02, 0.0)
+# Shares of the position tolerance, tried in turn: blended corners reduce the feed.
+_POSITION_SHARES = (1.0, 0.3)
+# Smallest number of samples along a segment.
+_MIN_SAMPLES = 400
+# Largest number of samples along a segment.
 _MOST = 2000
 # Length below which a segment has no feed [m].
-_SHORT = 1e-3
+_MIN_LENGTH = 1e-3
 # Shortest step [m].
-_STEP = 1e-5
-# Largest number of rounds that halve steps which exceed their tolerance.
-_TRIES = 12
+_MIN_STEP = 1e-5
+# Largest number of refinements, which halve the steps that exceed their tolerance.
+_MAX_REFINEMENTS = 12
 # Decimals of speeds [m/s].
 _SPEED_DIGITS = 8
-# Share of the time of a lead that each of its ramps takes: leads have no feed.
-_RAMP = 0.25
-# Change of the joints' deviation from place to place, as a share of its tolerance.
-_SWING = 0.1
-# Change that is allowed in any case, as at corners [rad or m].
-_LEAST_SWING = 3e-4
+# Duration of each ramp of a lead, which has no feed, as a share of the lead's duration.
+_RAMP_SHARE = 0.25
+# Largest change of the joints' deviation between samples, as a share of its tolerance.
+_MAX_CHANGE = 0.1
+# Change below which it is never too large, as at corners [rad or m].
+_MIN_CHANGE = 3e-4
 # Tolerance of the times of events [s].
-_PROMPT = 5e-4
+_EVENT_TOLERANCE = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,41 +73,43 @@ class FeedSection(PoseSection):
 
         With times where speeds do not do, and the segment says why.
         """
-        if rests(self.operation.motion, self.first, self.last):
+        if is_at_rest(self.operation.motion, self.first, self.last):
             return super().segments(allowed)
         self.check_regular(allowed)
-        parts = [replace(self, first=a, last=b) for a, b in pairwise(self._stops)]
+        parts = [replace(self, first=a, last=b) for a, b in pairwise(self._rest_times)]
         travel = [part._travel for part in parts]
         why, stuck = "there is no feed where the tool hardly moves", None
-        for free, share in product(_FREE, _OF_PLACES):
-            if min(each.whole for each in travel) < _SHORT:
+        for free, share in product(_FREE_TOLERANCES, _POSITION_SHARES):
+            if min(each.whole for each in travel) < _MIN_LENGTH:
                 break
             nearer = replace(allowed, position=share * allowed.position)
             turning = max(free, allowed.rotation)
             made = [
-                part._fewest(each, nearer, turning)
+                part._fewest_targets(each, nearer, turning)
                 for part, each in zip(parts, travel, strict=True)
             ]
             found = [segment for segment in made if isinstance(segment, FeedSegment)]
             if len(found) < len(parts):
                 # Where it is with the most that may be off.
                 stuck = stuck or next(at for at in made if not isinstance(at, FeedSegment))
-                why = self._lost(stuck, allowed)
+                why = self._failure_text(stuck, allowed)
                 continue
             why = (
                 "with poses at its feed it does not keep all that it has to (limits, clearances, "
                 "the feed itself): leave more room, or take a lower feed"
             )
-            if not all(part._is_prompt(own) for part, own in zip(parts, found, strict=True)):
+            if not all(
+                part._has_timely_events(own) for part, own in zip(parts, found, strict=True)
+            ):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
-            elif self._keeps(found, travel, allowed):
+            elif self._is_valid(found, travel, allowed):
                 pairs = zip(parts, found, strict=True)
                 return [(segment, part._deviation(segment)) for part, segment in pairs]
         ((timed, deviation),) = super().segments(allowed)
         return [(replace(timed, remark=f"{TIMES_HEADING}{why}"), deviation)]
 
-    def _lost(self, at: float, allowed: Tolerance) -> str:
-        """Return in words where no poses at a feed keep the motion, and what would help."""
+    def _failure_text(self, at: float, allowed: Tolerance) -> str:
+        """Return a message: where poses at a feed exceed the tolerance, and a remedy."""
         motion = self.operation.motion
         tool = self.operation.chains[0].place(motion(at)).translation
         position = ", ".join(f"{value:.3f}" for value in tool)
@@ -119,27 +121,27 @@ class FeedSection(PoseSection):
         )
 
     @property
-    def _stops(self) -> list[float]:
+    def _rest_times(self) -> list[float]:
         """Times at which the tool rests, from first to last [s]."""
         at = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
-        inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
+        inside = at[(at > self.first + _EVENT_TOLERANCE) & (at < self.last - _EVENT_TOLERANCE)]
         return [self.first, *inside.tolist(), self.last]
 
     @property
     def _travel(self) -> ArcLength:
         return ArcLength.of_motion(self.frames, self.operation.motion, self.first, self.last)
 
-    def _keeps(
+    def _is_valid(
         self, segments: Sequence[FeedSegment], travel: Sequence[ArcLength], allowed: Tolerance
     ) -> bool:
-        """Whether the seam keeps all that it has to with segments in place of its motion.
+        """Whether the seam satisfies its constraints with segments instead of its motion.
 
-        By each interpolation that a controller may use.
+        By each interpolation of the controller.
         """
         motions = (segment.at_pace(each) for segment, each in zip(segments, travel, strict=True))
-        return all(self._keeps_by(parts, allowed) for parts in by_interpolation(motions))
+        return all(self._is_valid_by(parts, allowed) for parts in by_interpolation(motions))
 
-    def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
+    def _is_valid_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
         motion, begin = self.operation.motion, self.first
         rows: list[tuple[Array, Array, Array]] = []
         for t, q, qd in parts:
@@ -148,7 +150,10 @@ class FeedSection(PoseSection):
             after_first = slice(1 if rows else 0, None)
             rows.append((begin + t[after_first], q[after_first], qd[after_first]))
             begin += float(t[-1])
-        before, after = motion.t < self.first - _PROMPT, motion.t > self.last + _PROMPT
+        before, after = (
+            motion.t < self.first - _EVENT_TOLERANCE,
+            motion.t > self.last + _EVENT_TOLERANCE,
+        )
         given = motion.t, motion.q, motion.qd
         whole = [
             np.concatenate([own[before], *each, own[after]])
@@ -157,85 +162,90 @@ class FeedSection(PoseSection):
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
         return self.operation.keeps is not None and self.operation.keeps(judged, allowed)
 
-    def _is_prompt(self, segment: FeedSegment) -> bool:
-        """Whether there is time to run up, and events are on time, ramps being even."""
+    def _has_timely_events(self, segment: FeedSegment) -> bool:
+        """Whether there is time for the ramps, and events are on time with even ramps."""
         if not segment.ramps.each > 0.0:
             return False
         own = segment.ramps.times(segment.t)
         return all(
-            abs(own[event.target] - (at - self.first)) < _PROMPT
+            abs(own[event.target] - (at - self.first)) < _EVENT_TOLERANCE
             for event, (at, _) in zip(segment.events, self.events, strict=True)
         )
 
-    def _fewest(self, travel: ArcLength, allowed: Tolerance, free: float) -> FeedSegment | float:
-        """Return the fewest targets; where none keep what is allowed, near when that is [s]."""
-        fixed = self._fixed(travel)
-        along = self._along(travel, fixed)
+    def _fewest_targets(
+        self, travel: ArcLength, allowed: Tolerance, free: float
+    ) -> FeedSegment | float:
+        """Return the segment with the fewest targets; a time near the failure [s] if none."""
+        fixed = self._fixed_lengths(travel)
+        along = self._sampled(travel, fixed)
         marks = [int(np.abs(along.travel - each).argmin()) for each in fixed]
         limits = Allowed(allowed.position, allowed.rotation, free)
         steps = StepSearch(self.frames, self.operation.rotation_task, along, limits).between(marks)
         if not isinstance(steps, Steps):
-            return self._when(travel, along.travel[steps])
-        for _ in range(_TRIES):
+            return self._time_at(travel, along.travel[steps])
+        for _ in range(_MAX_REFINEMENTS):
             segment = self._segment(travel, along, steps)
-            taken = self._off(segment, limits)
-            if not isinstance(taken, np.ndarray):
-                return taken
-            far = taken > 1.0
+            shares = self._deviation_shares(segment, limits)
+            if not isinstance(shares, np.ndarray):
+                return shares
+            far = shares > 1.0
             if not far.any():
                 return segment
-            worst = steps.ends[int(taken.argmax())]
+            worst = steps.ends[int(shares.argmax())]
             finer = steps.halved(far)
             if len(finer.ends) == len(steps.ends):
                 break
             steps = finer
-        return self._when(travel, along.travel[worst])
+        return self._time_at(travel, along.travel[worst])
 
-    def _when(self, travel: ArcLength, far: float) -> float:
-        """Return when the tool has gone so far [s]."""
+    def _time_at(self, travel: ArcLength, far: float) -> float:
+        """Return the time at which the tool has travelled an arc length [s]."""
         return float(np.clip(travel.when(np.array([far]))[0], self.first, self.last))
 
-    def _fixed(self, travel: ArcLength) -> Array:
-        """Return how far the tool is at ends, events, and where feeds change [m]."""
+    def _fixed_lengths(self, travel: ArcLength) -> Array:
+        """Return the arc lengths of ends, events and changes of the feed [m]."""
         start = float(self.operation.motion.t[0])
         changes = [start + item.during.ravel() for item in self.operation.feeds[0]]
         times = np.concatenate([[at for at, _ in self.events], *changes])
         inside = np.unique(travel.at(times[(times > self.first) & (times < self.last)]))
-        inside = inside[(inside > _STEP) & (inside < travel.whole - _STEP)]
-        inside = inside[np.append(True, np.diff(inside) > _STEP)[: len(inside)]]
+        inside = inside[(inside > _MIN_STEP) & (inside < travel.whole - _MIN_STEP)]
+        inside = inside[np.append(True, np.diff(inside) > _MIN_STEP)[: len(inside)]]
         return np.concatenate([[0.0], inside, [travel.whole]])
 
-    def _along(self, travel: ArcLength, fixed: Array) -> SampledPoses:
+    def _sampled(self, travel: ArcLength, fixed: Array) -> SampledPoses:
         motion = self.operation.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
-        inside = inside[:: max(1, len(inside) // (_MOST - _FEWEST))]
-        even = np.linspace(0.0, travel.whole, _FEWEST + 1)
+        inside = inside[:: max(1, len(inside) // (_MOST - _MIN_SAMPLES))]
+        even = np.linspace(0.0, travel.whole, _MIN_SAMPLES + 1)
         others = np.unique(np.concatenate([even, travel.at(inside)]))
-        others = others[np.append(True, np.diff(others) > _STEP)]
-        apart = np.abs(others[:, None] - fixed).min(axis=1) > _STEP
+        others = others[np.append(True, np.diff(others) > _MIN_STEP)]
+        apart = np.abs(others[:, None] - fixed).min(axis=1) > _MIN_STEP
         far = np.sort(np.concatenate([fixed, others[apart]]))
-        q = self._at(travel, far)
+        q = self._configurations_at(travel, far)
         positions, quaternions = self.frames.tool_poses(q)
         rows = np.hstack([positions, aligned_quaternions(quaternions), q[:, self.frames.external]])
         return SampledPoses(
-            far, q, rows, lambda lengths: self.frames.tool_poses(self._at(travel, lengths))[0]
+            far,
+            q,
+            rows,
+            lambda lengths: self.frames.tool_poses(self._configurations_at(travel, lengths))[0],
         )
 
-    def _at(self, travel: ArcLength, far: Array) -> Array:
-        """Return the motion where the tool has gone so far, (K, n)."""
+    def _configurations_at(self, travel: ArcLength, far: Array) -> Array:
+        """Return the configurations at arc lengths, (K, n)."""
         return self.operation.motion(np.minimum(travel.when(far), self.last))
 
     def _segment(self, travel: ArcLength, along: SampledPoses, steps: Steps) -> FeedSegment:
-        """Return targets, as the file has them."""
+        """Return the segment of targets, rounded to the digits of the file."""
         motion, ends = self.operation.motion, steps.ends
-        q = self._in_digits(along.q[ends])
+        q = self._rounded(along.q[ends])
         positions, quaternions = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
         vias = np.full((len(ends) - 1, 3), np.nan)
         for k in np.flatnonzero(steps.round):
             via = along.middle(ends[k], ends[k + 1])
             via = self.rounding(via[None], quaternions[[k]])[0][0]
             arc = arc_through(positions[k], via, positions[k + 1])
-            # Halved ones may be too short: they are straight then.
+            # A halved step may be too short for an arc: it is linear then.
             if arc is not None and arc.is_meant:
                 vias[k] = via
         found, arrived = self.frames.solved(positions, quaternions, self._mixed(along.q[ends], q))
@@ -248,7 +258,7 @@ class FeedSection(PoseSection):
 
         def near(own: Array) -> Array:
             share = np.interp(own, times, far) / far[-1]
-            return self._at(travel, share * travel.whole)
+            return self._configurations_at(travel, share * travel.whole)
 
         events = [
             Event(int(np.abs(along.travel[ends] - travel.at(np.array([at]))).argmin()), name)
@@ -270,18 +280,20 @@ class FeedSection(PoseSection):
         )
 
     def _speeds(self, travel: ArcLength, ends: Array) -> Array:
-        """Return the feed of each step; beside a feed, what takes as long with its ramps [m/s]."""
+        """Return the feed of each step; for leads the speed that takes their duration [m/s]."""
         middles = travel.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
-        found = np.full(len(middles), travel.whole / ((1.0 - _RAMP) * (self.last - self.first)))
+        found = np.full(
+            len(middles), travel.whole / ((1.0 - _RAMP_SHARE) * (self.last - self.first))
+        )
         for item in self.operation.feeds[0]:
             for begin, end in item.during:
                 found[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(found, _SPEED_DIGITS)
 
-    def _off(self, segment: FeedSegment, allowed: Allowed) -> Array | float:
-        """Return how much of what is allowed each step takes, corners included, (K,).
+    def _deviation_shares(self, segment: FeedSegment, allowed: Allowed) -> Array | float:
+        """Return the deviation of each step as a share of its tolerance, (K,).
 
-        Where joints swing between two looks, as they do near a singular pose, near when [s].
+        Where the joints' deviation jumps between samples, as near a singular pose, that time [s].
         """
         times, count = segment.evaluation_times(), len(segment.t) - 1
         exact = segment.reference(self.operation.motion, self.first)
@@ -289,16 +301,16 @@ class FeedSection(PoseSection):
         worst = np.zeros(count)
         for line in segment.interpolated(times):
             off = line - exact
-            swing = np.abs(np.diff(off, axis=0)).max(axis=1)
-            # Written so that NaN does.
-            swings = ~(swing <= max(_SWING * allowed.free, _LEAST_SWING))
-            if swings.any():
-                return float(min(self.first + times[int(swings.argmax())], self.last))
+            change = np.abs(np.diff(off, axis=0)).max(axis=1)
+            # Written so that NaN counts as a jump.
+            changes = ~(change <= max(_MAX_CHANGE * allowed.free, _MIN_CHANGE))
+            if changes.any():
+                return float(min(self.first + times[int(changes.argmax())], self.last))
             positions, quaternions = self.frames.tool_poses(line)
-            taken = np.linalg.norm(positions - at, axis=1) / allowed.position
-            taken = np.maximum(taken, np.abs(off).max(axis=1) / allowed.free)
+            shares = np.linalg.norm(positions - at, axis=1) / allowed.position
+            shares = np.maximum(shares, np.abs(off).max(axis=1) / allowed.free)
             turned = allowed.turned(self.frames, self.operation.rotation_task, quaternions, facing)
-            worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
+            worst = np.maximum(worst, largest(np.maximum(shares, turned), count))
         return SAMPLING_FACTOR * worst
 
 

@@ -23,7 +23,7 @@ from selfmotion.shop.controllers.segments import (
     aligned_quaternions,
     finer,
 )
-from selfmotion.shop.controllers.thinning import Operation, Section, rests
+from selfmotion.shop.controllers.thinning import Operation, Section, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # As few tool poses as keep a controller near a motion.
@@ -34,7 +34,7 @@ from selfmotion.shop.controllers.tool_frames import ToolFrames
 # by inverse kinematics of what is in between.
 
 # Largest number of refinements of the targets.
-_TRIES = 16
+_MAX_REFINEMENTS = 16
 # Shortest time between two targets: controllers do not interpolate in less [s].
 _SHORTEST = 4e-3
 # Number of refinements that add targets everywhere …
@@ -68,7 +68,7 @@ class PoseSection(Section):
     frames: ToolFrames
     rounding: Rounding
 
-    sparse: ClassVar[float] = 0.02
+    min_density: ClassVar[float] = 0.02
     fewest: ClassVar[int] = 2
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
@@ -85,7 +85,7 @@ class PoseSection(Section):
     def check_regular(self, allowed: Tolerance) -> None:
         """Raise NotByPosesError where the arm is singular within what is allowed."""
         motion = self.operation.motion
-        if rests(motion, self.first, self.last):
+        if is_at_rest(motion, self.first, self.last):
             return
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         marks = np.concatenate([[self.first], inside, [self.last]])
@@ -109,23 +109,23 @@ class PoseSection(Section):
             raise self._singular(self.first, allowed)
         return segment, deviation
 
-    def _within(self, allowed: Tolerance, fixed: Array) -> Array:
-        """See `Section._within`.
+    def _target_times(self, allowed: Tolerance, fixed: Array) -> Array:
+        """See `Section._target_times`.
 
         Raises
         ------
         NotByPosesError
             There are no such poses.
         """
-        t, more = self.spread(fixed, allowed, 1.0), 1.0
-        for tries in range(_TRIES):
-            shares = self._shares(self._passing(t), allowed)
+        t, more = self.spread_targets(fixed, allowed, 1.0), 1.0
+        for tries in range(_MAX_REFINEMENTS):
+            shares = self._shares(self._segment_through(t), allowed)
             far, worst = shares > 1.0, float(shares.max())
             if not far.any():
                 return t
             if tries < _EVENLY and worst < _MUCH:
                 more *= max(1.05, 1.02 * float(np.sqrt(worst)))
-                t = self.spread(fixed, allowed, more)
+                t = self.spread_targets(fixed, allowed, more)
                 continue
             if np.diff(t)[far].min() < _SHORTEST:
                 break
@@ -146,8 +146,8 @@ class PoseSection(Section):
         """Digits of poses are finer than those of joints."""
 
     @override
-    def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
-        segment = super()._passing(t, at_rest=at_rest)
+    def _segment_through(self, t: Array, *, at_rest: bool = False) -> Segment:
+        segment = super()._segment_through(t, at_rest=at_rest)
         if at_rest:
             return segment
         motion = self.operation.motion
@@ -201,7 +201,7 @@ class PoseSection(Section):
         return np.where(np.isfinite(worst), SAMPLING_FACTOR * worst, np.inf)
 
     @override
-    def bend(self, t: Array, allowed: Tolerance) -> Array:
+    def scaled_acceleration(self, t: Array, allowed: Tolerance) -> Array:
         """Return accelerations of poses and joints as shares of what is allowed, (K,) [1/s²]."""
         motion = self.operation.motion
         middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
@@ -337,20 +337,20 @@ def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, fl
         if motion.t[end] - motion.t[begin] >= _WHILE:
             marks += [float(motion.t[begin]), float(motion.t[end])]
     marks.append(float(motion.t[-1]))
-    for stop in _stops(motion, events):
-        if np.abs(stop - np.array(marks)).min() >= _WHILE and not _within(stop, marks, motion):
+    for stop in _rest_times(motion, events):
+        if np.abs(stop - np.array(marks)).min() >= _WHILE and not _is_paused(stop, marks, motion):
             marks.append(stop)
     marks = sorted(set(marks))
     return list(pairwise(marks))
 
 
-def _within(stop: float, marks: Sequence[float], motion: Trajectory) -> bool:
+def _is_paused(stop: float, marks: Sequence[float], motion: Trajectory) -> bool:
     """Whether a time is in one of the rests that last."""
     first, last = max(m for m in marks if m < stop), min(m for m in marks if m > stop)
-    return rests(motion, first, last)
+    return is_at_rest(motion, first, last)
 
 
-def _stops(motion: Trajectory, events: Sequence[float]) -> list[float]:
+def _rest_times(motion: Trajectory, events: Sequence[float]) -> list[float]:
     """Return when the arm rests for an instant [s]: where an event is then, at that."""
     speeds = np.abs(motion.qd).max(axis=1)
     slow = min(_SLOW, _SHARE * float(speeds.max()))

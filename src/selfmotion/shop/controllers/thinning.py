@@ -73,20 +73,24 @@ def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
     """
     match plan:
         case Plan():
-            return [_of_plan("path", plan)]
+            return [_plan_operation("path", plan)]
         case Move():
-            return [_of_move("move", plan)]
+            return [_move_operation("move", plan)]
         case Parts():
             found = []
             for number, part in enumerate(plan.plans, 1):
-                found.append(_of_plan(f"part {number}", part))
-                found += [_of_move(f"move {number}", m) for m in plan.moves[number - 1 : number]]
+                found.append(_plan_operation(f"part {number}", part))
+                found += [
+                    _move_operation(f"move {number}", m) for m in plan.moves[number - 1 : number]
+                ]
             return found
     found = []
     for step in plan.steps:
         made = step.made
         operation = (
-            _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
+            _plan_operation(step.name, made)
+            if isinstance(made, Plan)
+            else _move_operation(step.name, made)
         )
         found.append(operation._replace(events=tuple((at, name) for name, at in step.happenings)))
     if not found:
@@ -94,7 +98,7 @@ def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
     return found
 
 
-def _of_plan(name: str, plan: Plan) -> Operation:
+def _plan_operation(name: str, plan: Plan) -> Operation:
     items = plan.problem.follows.items
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
@@ -150,7 +154,7 @@ def constraints_of_lines(constraints: Sequence[Constraint]) -> tuple[Constraint,
     )
 
 
-def _of_move(name: str, move: Move) -> Operation:
+def _move_operation(name: str, move: Move) -> Operation:
     room = safe_deviation(move)
     return Operation(
         name,
@@ -214,7 +218,7 @@ _OF_SPEED = 0.9995
 # Times at which the motion's curvature is evaluated, per interval between two samples.
 _FINER = 4
 # Largest number of refinements of the targets.
-_TRIES = 20
+_MAX_REFINEMENTS = 20
 # Largest number of targets that a controller takes.
 _MOST = 100_000
 
@@ -227,9 +231,9 @@ class Section:
     ----------
     operation : Operation
     slides : (n,)
-        Which joints slide.
+        Whether each joint is prismatic.
     first, last : float
-        From when to when [s].
+        Begin and end [s].
     """
 
     operation: Operation
@@ -237,13 +241,13 @@ class Section:
     first: float
     last: float
     # Smallest density of targets, as a share of the largest one.
-    sparse: ClassVar[float] = 0.1
+    min_density: ClassVar[float] = 0.1
     # Smallest number of targets between two events or rests.
     fewest: ClassVar[int] = 4
 
     @property
     def events(self) -> list[tuple[float, str]]:
-        """Times of its events [s], and their names."""
+        """Times of the section's events [s], and their names."""
         start, end = float(self.operation.motion.t[0]), float(self.operation.motion.t[-1])
         return [
             (start + at, name)
@@ -253,7 +257,7 @@ class Section:
         ]
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
-        """Return its segments: one, or several if the tool rests in between.
+        """Return the segments of the section: several if the tool rests in between.
 
         Raises
         ------
@@ -263,67 +267,69 @@ class Section:
         return [self.thinned(allowed)]
 
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
-        """Return the segment of its targets, and their deviation.
+        """Return the segment with the fewest targets, and its deviation.
 
         Raises
         ------
         ProblemError
-            Digits are too few for what is allowed, or targets too many.
+            The digits of files are too few for the tolerance, or the targets too many.
         """
-        fixed = _apart(self.first, self.last, [at for at, _ in self.events])
-        if rests(self.operation.motion, self.first, self.last):
-            return self._passing(fixed, at_rest=True), NO_DEVIATION
+        fixed = _distinct_times(self.first, self.last, [at for at, _ in self.events])
+        if is_at_rest(self.operation.motion, self.first, self.last):
+            return self._segment_through(fixed, at_rest=True), NO_DEVIATION
         self._check_digits(allowed)
-        t = self._within(allowed, fixed)
-        for _ in range(_TRIES):
-            segment = self._passing(t)
-            missed = self._too_far(segment)
-            if not missed.any():
+        t = self._target_times(allowed, fixed)
+        for _ in range(_MAX_REFINEMENTS):
+            segment = self._segment_through(t)
+            exceeded = self._exceeds_speed(segment)
+            if not exceeded.any():
                 break
-            # With their neighbours, so that steps do not differ much.
-            near = np.convolve(missed, np.ones(3), mode="same") > 0.0
+            # With the neighbouring intervals, so that their lengths vary slowly.
+            near = np.convolve(exceeded, np.ones(3), mode="same") > 0.0
             near &= np.diff(t) > 2.0 * _SHORTEST
             if not near.any():
                 break
             t = np.sort(np.append(t, 0.5 * (t[1:] + t[:-1])[near]))
         return segment, self._deviation(segment)
 
-    def _within(self, allowed: Tolerance, fixed: Array) -> Array:
-        """Return times of targets that keep the tool and the joints near the motion."""
+    def _target_times(self, allowed: Tolerance, fixed: Array) -> Array:
+        """Return times of targets with which the deviation is within the tolerance."""
         more = 1.0
-        for _ in range(_TRIES):
-            t = self.spread(fixed, allowed, more)
-            deviation = self._deviation(self._passing(t))
+        for _ in range(_MAX_REFINEMENTS):
+            t = self.spread_targets(fixed, allowed, more)
+            deviation = self._deviation(self._segment_through(t))
             if deviation.share(allowed) <= 1.0:
                 return t
             more *= max(1.05, 1.02 * float(np.sqrt(deviation.share(allowed))))
         raise ProblemError(
             f"'{self.operation.name}' is off by {1e3 * deviation.position:.3g} mm and "
             f"{np.degrees(max(deviation.rotation, deviation.joint)):.3g}° with {len(t)} targets; "
-            f"allow more than {_in_words(self.operation, allowed)}"
+            f"allow more than {_tolerance_text(self.operation, allowed)}"
         )
 
-    def spread(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
-        """Return times between fixed ones, even in the root of how much the motion bends."""
+    def spread_targets(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
+        """Return times between fixed ones, with a density by the root of the acceleration."""
         found, motion = [fixed[:1]], self.operation.motion
         for begin, end in pairwise(fixed):
             inside = motion.t[(motion.t > begin) & (motion.t < end)]
             marks = np.concatenate([[begin], inside, [end]])
             count = _FINER * (len(marks) - 1) + 1
             t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-            rate = np.sqrt(self.bend(t, allowed) / 8.0)
-            # A spline swings where long and short steps meet, and it bends nowhere.
-            rate = np.maximum(rate, self.sparse * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
+            rate = np.sqrt(self.scaled_acceleration(t, allowed) / 8.0)
+            # A spline oscillates where interval lengths jump.
+            rate = np.maximum(rate, self.min_density * float(rate.max())) + 1e-3 / max(
+                end - begin, 1e-6
+            )
             total = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
             targets = max(self.fewest, int(np.ceil(more * total[-1])))
-            # Programs count whole digits of time: targets may not fall on each other.
+            # Times have few digits in programs: targets may not coincide.
             targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
             found.append(np.interp(np.linspace(0.0, total[-1], targets + 1)[1:], total, t))
             found[-1][-1] = end
         return np.concatenate(found)
 
-    def bend(self, t: Array, allowed: Tolerance) -> Array:
-        """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
+    def scaled_acceleration(self, t: Array, allowed: Tolerance) -> Array:
+        """Return accelerations of tool and joints divided by their tolerances, (K,) [1/s²]."""
         motion = self.operation.motion
         q, qdd = motion(t), motion(t, 2)
         found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
@@ -333,15 +339,15 @@ class Section:
                 found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
         return found
 
-    def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
-        """Return targets at times, as the file has them."""
+    def _segment_through(self, t: Array, *, at_rest: bool = False) -> Segment:
+        """Return the segment of targets at times, rounded to the digits of the file."""
         if len(t) > _MOST:
             raise ProblemError(
                 f"'{self.operation.name}' takes more than {_MOST} targets; allow a larger deviation"
             )
         offset = np.round(t - self.first, TIME_DIGITS)
-        # Where the arm is at the times that the file has.
-        q = self._in_digits(self.operation.motion(np.minimum(self.first + offset, self.last)))
+        # Configurations at the rounded times.
+        q = self._rounded(self.operation.motion(np.minimum(self.first + offset, self.last)))
         if at_rest:
             q[:] = q[0]
         events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
@@ -350,44 +356,44 @@ class Section:
     def _deviation(self, segment: Segment) -> Deviation:
         return deviation_of(segment, self.operation.motion, self.operation.chains, self.first)
 
-    def _in_digits(self, q: Array) -> Array:
-        """Return coordinates [rad or m] as they are when their digits in a file are read again."""
+    def _rounded(self, q: Array) -> Array:
+        """Return coordinates [rad or m] rounded to the digits of files."""
         degrees = np.radians(np.round(np.degrees(q), ANGLE_DIGITS))
         return np.where(self.slides, 1e-3 * np.round(1e3 * q, LENGTH_DIGITS), degrees)
 
     def _check_digits(self, allowed: Tolerance) -> None:
-        """Refuse what no number of targets keeps, as they have few digits."""
+        """Refuse a tolerance below the rounding of targets to the digits of files."""
         q = self.operation.motion.q
-        deviation = deviation_between(self._in_digits(q), q, self.operation.chains)
+        deviation = deviation_between(self._rounded(q), q, self.operation.chains)
         if deviation.share(allowed) > 1.0:
             raise ProblemError(
                 f"'{self.operation.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, "
                 f"which is up to {1e3 * deviation.position:.2g} mm and "
                 f"{np.degrees(deviation.rotation):.2g}° of the tool; allow more than "
-                f"{_in_words(self.operation, allowed)}"
+                f"{_tolerance_text(self.operation, allowed)}"
             )
 
-    def _too_far(self, segment: Segment) -> Flags:
-        """Whether a feed is missed, or a limit of speed passed, between two targets (K,).
+    def _exceeds_speed(self, segment: Segment) -> Flags:
+        """Whether a feed or a speed limit is violated in each interval between targets, (K,).
 
-        Where the motion itself does not; on the spline through the targets and straight between
-        them. Cut corners are slower than that.
+        Only where the motion itself satisfies it; on the spline through the targets, and by linear
+        interpolation. Blended corners are slower than these.
         """
         far = np.zeros(len(segment.t) - 1)
         for times, q, qd in islice(segment.motions(), 2):
             step = np.clip(np.searchsorted(segment.t, times, side="right") - 1, 0, len(far) - 1)
-            np.maximum.at(far, step, self._taken(times, q, qd))
+            np.maximum.at(far, step, self._speed_shares(times, q, qd))
         return np.asarray(far > 1.0)
 
-    def _taken(self, times: Array, q: Array, qd: Array) -> Array:
-        """Return how much is taken of what feeds and limits of speed leave, at times (K,)."""
+    def _speed_shares(self, times: Array, q: Array, qd: Array) -> Array:
+        """Return deviations of speeds as shares of the margins of feeds and speed limits, (K,)."""
         motion = self.operation.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
-        taken = np.zeros(len(t))
+        shares = np.zeros(len(t))
         if self.operation.speeds is not None:
             within = np.abs(rates) <= _OF_SPEED * self.operation.speeds
-            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.operation.speeds), 0.0).max(
+            shares = np.where(within, np.abs(qd) / (_OF_SPEED * self.operation.speeds), 0.0).max(
                 axis=1
             )
         for chain, feeds in zip(self.operation.chains, self.operation.feeds, strict=False):
@@ -400,12 +406,12 @@ class Section:
                 room = _OF_FEED * feed.slowest * feed.left_over
                 for begin, end in feed.during + motion.t[0]:
                     during = (t > begin) & (t < end)
-                    taken = np.maximum(taken, np.where(during, off / max(room, 1e-12), 0.0))
-        return taken
+                    shares = np.maximum(shares, np.where(during, off / max(room, 1e-12), 0.0))
+        return shares
 
 
-def _in_words(operation: Operation, allowed: Tolerance) -> str:
-    """Return the tolerance as the file of settings has it."""
+def _tolerance_text(operation: Operation, allowed: Tolerance) -> str:
+    """Return a tolerance as a line of a file of settings."""
     key = "move_deviation" if operation.is_move else "deviation"
     return (
         f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "
@@ -413,8 +419,8 @@ def _in_words(operation: Operation, allowed: Tolerance) -> str:
     )
 
 
-def _apart(first: float, last: float, times: Sequence[float]) -> Array:
-    """Return first, last and times between them, but for those that are written as the same."""
+def _distinct_times(first: float, last: float, times: Sequence[float]) -> Array:
+    """Return first, last and the times between them that are distinct after rounding."""
     least, found = 2.0 * 10.0**-TIME_DIGITS, [first]
     for t in sorted(times):
         if found[-1] + least < t < last - least:
@@ -422,7 +428,7 @@ def _apart(first: float, last: float, times: Sequence[float]) -> Array:
     return np.array([*found, last])
 
 
-def rests(motion: Trajectory, first: float, last: float) -> bool:
-    """Whether nothing moves from one time to another."""
+def is_at_rest(motion: Trajectory, first: float, last: float) -> bool:
+    """Whether all joints are at rest between two times."""
     times = np.linspace(first, last, 33)
     return bool(np.abs(motion(times) - motion(first)).max() < 1e-9)
