@@ -159,7 +159,7 @@ def write(file: Path, results: dict[str, Result]) -> None:
         for name, item in sorted(results.items())
     ]
     with file.open("w", newline="") as stream:
-        csv.writer(stream).writerows([COLUMNS, *rows])
+        csv.writer(stream, lineterminator="\n").writerows([COLUMNS, *rows])
 
 
 def better(kept: Result | None, found: Result) -> Result:
