@@ -250,7 +250,7 @@ class Page {
           to.camera.position.copy(from.camera.position);
           to.camera.quaternion.copy(from.camera.quaternion);
           to.controls.target.copy(from.controls.target);
-          to.set_dirty();
+          to.draw();
         });
       }
     }
