@@ -55,6 +55,8 @@ async function start() {
     const geometries = object.geometries?.map((geometry) => expandGeometry(geometry, meshes));
     viewer.handle_command(geometries ? { ...command, object: { ...object, geometries } } : command);
   }
+  // meshcat lets every object cast a shadow; the light of the sky has none.
+  viewer.scene_tree.find(["selfmotion", "stage", "sky"]).object.traverse((object) => { object.castShadow = false; });
   for (const path of ["ghost", "ellipsoid", "bodies"]) hide(`${ROOT}/${path}`);
   for (const { root } of plan.tips) hide(`${root}/start`);
   const { movers } = content;
