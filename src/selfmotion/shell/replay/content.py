@@ -70,9 +70,9 @@ class _Tip:
 class _Motion:
     """A plan, sampled: the motion itself and the minimum-norm motion."""
 
-    def __init__(self, plan: Plan, whole: Whole | None) -> None:
+    def __init__(self, plan: Plan, whole: Whole | None, *, brief: bool = False) -> None:
         robot = plan.robot
-        self.plan, self.whole = plan, whole
+        self.plan, self.whole, self.brief = plan, whole, brief
         self.frames = key_frames(robot, plan.trajectory)
         self.ghost = key_frames(robot, plan.initial_trajectory)
         self.tips = [_Tip(plan, item, whole) for item in plan.problem.follows.items]
@@ -80,8 +80,9 @@ class _Motion:
         self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
-        self.clearance = None if grows else clearance_curve(plan.trajectory, models)
-        self.self_motion = None if whole else self_motion(plan.problem, plan.trajectory)
+        self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
+        still = whole is not None or brief
+        self.self_motion = None if still else self_motion(plan.problem, plan.trajectory)
 
 
 def page_content(
@@ -112,6 +113,7 @@ def page_content(
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
+        "radius": box.radius,
         "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),
@@ -135,6 +137,33 @@ def page_content(
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
         "table": [*_missing(arm, len(plans)), *_facts(plans, whole)],
+    }
+
+
+def plan_content(
+    plan: Plan,
+    name: str,
+    payload: Payload,
+    *,
+    radius: float,
+    triads: int,
+    whole: Whole | None = None,
+    brief: bool = False,
+) -> Json:
+    """Return what of a page is another with another plan, in a scene of that radius [m].
+
+    A `brief` one is without what takes longest: distances, self-motions and the redundancy map.
+    """
+    motion = _Motion(plan, whole, brief=brief)
+    scale = _scale([motion])
+    root = "/selfmotion/plan0"
+    longest = float(np.linalg.norm(motion.shown.ellipsoid, axis=(1, 2)).max())
+    return {
+        "scale": {**scale, "colors": three.COLOR_SCALE},
+        "ellipsoidSize": _ELLIPSOID_LENGTH * radius / longest,
+        "joints": _joints(plan),
+        "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
+        "table": _facts([plan], whole),
     }
 
 
@@ -205,7 +234,9 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
-        "redundancy": None if whole else packed_map(map_of(motion.plan), payload),
+        "redundancy": None
+        if whole or motion.brief
+        else packed_map(map_of(motion.plan), payload),
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {

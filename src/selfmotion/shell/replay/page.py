@@ -37,6 +37,7 @@ Shown = Plan | Sequence[Plan] | Program | Parts | Move
 _TRIADS, _MOST_TRIADS = 7, 1000
 # three.js, as `make three` takes it from its own package; the page's own scripts.
 _THREE = "three/three.min.js"
+_LIVE = ("handles.js", "live.js")
 _SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "page.js")
 
 
@@ -101,6 +102,19 @@ def replay_html(
     return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
 
 
+def live_html(plan: Plan, *, title: str) -> tuple[str, float]:
+    """Return the page of a plan that is changed while it is shown, and the scene's radius [m].
+
+    It is that of `replay_html` with the modules that a server is asked by: see `shell.view`.
+    """
+    payload = Payload()
+    content = page_content([plan], ["plan"], payload, triads=_TRIADS)
+    picture = still(plan.robot, plan.trajectory, plan.obstacles, content["camera"], [])
+    live = payload.pack({**content, "live": True})
+    page = _assemble(title, describe(plan), live, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))
+    return page, float(content["radius"])
+
+
 def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
@@ -161,10 +175,17 @@ def _checked(triads: int | npt.ArrayLike) -> int | Array:
     return np.atleast_1d(as_numbers(triads, "triads", "how many, or times [s]"))
 
 
-def _assemble(title: str, description: str, payload: str, picture: str) -> str:
-    code, script = web(_THREE), joined(_SCRIPTS)
+def _assemble(
+    title: str,
+    description: str,
+    payload: str,
+    picture: str,
+    scripts: Sequence[str] = _SCRIPTS,
+) -> str:
+    code, script = web(_THREE), joined(scripts)
+    live = scripts is not _SCRIPTS
     return Template(web("page.html")).substitute(
-        policy=policy(script, code),
+        policy=policy(script, code, live=live),
         title=html.escape(title),
         description=html.escape(description),
         style=web("style.css"),
@@ -183,8 +204,11 @@ def joined(names: Sequence[str]) -> str:
     return "\n" + "\n".join(web(name) for name in names)
 
 
-def policy(*scripts: str) -> str:
-    """Return what a page may load and run: these scripts, and nothing from outside."""
+def policy(*scripts: str, live: bool = False) -> str:
+    """Return what a page may load and run: these scripts, and nothing from outside.
+
+    One that is `live` may ask the server that it came from.
+    """
     return "; ".join(
         [
             "default-src 'none'",
@@ -192,6 +216,7 @@ def policy(*scripts: str) -> str:
             # What moves is placed by its own style.
             "style-src 'unsafe-inline'",
             "img-src data: blob:",
+            *(["connect-src 'self'"] if live else []),
             "base-uri 'none'",
             "form-action 'none'",
         ]
