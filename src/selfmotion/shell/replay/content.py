@@ -43,17 +43,21 @@ _THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 _FRAME_LENGTH = 0.12
+# Points of the curves of a brief page.
+_FEW = 101
 
 
 class _Tip:
     """What follows a path, sampled: where it is and was to be, where the path is carried."""
 
-    def __init__(self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None) -> None:
+    def __init__(
+        self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None, few: dict[str, int]
+    ) -> None:
         self.carrier = follow.chain.carrier
-        points = {} if whole is None else {"points": whole.points}
+        points = few if whole is None else {"points": whole.points}
         self.shown = curves(plan, plan.trajectory, follow, **points)
         still = plan.initial_trajectory is plan.trajectory
-        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow)
+        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow, **few)
         # The whole path, also where the motion ends before it.
         times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
         base = follow.chain.base_placement
@@ -70,19 +74,23 @@ class _Tip:
 class _Motion:
     """A plan, sampled: the motion itself and the minimum-norm motion."""
 
-    def __init__(self, plan: Plan, whole: Whole | None, *, brief: bool = False) -> None:
+    def __init__(
+        self, plan: Plan, whole: Whole | None, *, brief: bool = False, with_map: bool = True
+    ) -> None:
         robot = plan.robot
-        self.plan, self.whole, self.brief = plan, whole, brief
+        self.plan, self.whole = plan, whole
+        self.with_map = with_map and whole is None
         self.frames = key_frames(robot, plan.trajectory)
-        self.ghost = key_frames(robot, plan.initial_trajectory)
-        self.tips = [_Tip(plan, item, whole) for item in plan.problem.follows.items]
+        still = plan.initial_trajectory is plan.trajectory
+        self.ghost = self.frames if still else key_frames(robot, plan.initial_trajectory)
+        few = {"points": _FEW} if brief else {}
+        self.tips = [_Tip(plan, item, whole, few) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
         self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
         self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
-        still = whole is not None or brief
-        self.self_motion = None if still else self_motion(plan.problem, plan.trajectory)
+        self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
 
 
 def page_content(
@@ -92,14 +100,15 @@ def page_content(
     *,
     triads: int | npt.ArrayLike,
     whole: Whole | None = None,
+    with_map: bool = True,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
 
-    `whole` is what the one plan stands for, where it does.
+    `whole` is what the one plan stands for, where it does; maps take seconds, and may be left out.
     """
     robot = plans[0].robot
     arm = links.bake(robot, payload)
-    motions = [_Motion(plan, whole) for plan in plans]
+    motions = [_Motion(plan, whole, with_map=with_map) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -152,9 +161,9 @@ def plan_content(
 ) -> Json:
     """Return what of a page is another with another plan, in a scene of that radius [m].
 
-    A `brief` one is without what takes longest: distances, self-motions and the redundancy map.
+    Without the redundancy map; a `brief` one also without distances and self-motions.
     """
-    motion = _Motion(plan, whole, brief=brief)
+    motion = _Motion(plan, whole, brief=brief, with_map=False)
     scale = _scale([motion])
     root = "/selfmotion/plan0"
     longest = float(np.linalg.norm(motion.shown.ellipsoid, axis=(1, 2)).max())
@@ -209,7 +218,7 @@ def _plan(
     size: float,
 ) -> Json:
     """Return what a page needs of one plan, its traces below the node `root`."""
-    shown, whole = motion.shown, motion.whole
+    plan, shown, whole = motion.plan, motion.shown, motion.whole
     times = (
         np.linspace(0.0, shown.t[-1], triads)
         if isinstance(triads, int)
@@ -234,9 +243,7 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
-        "redundancy": None
-        if whole or motion.brief
-        else packed_map(map_of(motion.plan), payload),
+        "redundancy": packed_map(map_of(plan), payload) if motion.with_map else None,
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {

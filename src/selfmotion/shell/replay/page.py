@@ -108,7 +108,7 @@ def live_html(plan: Plan, *, title: str) -> tuple[str, float]:
     It is that of `replay_html` with the modules that a server is asked by: see `shell.view`.
     """
     payload = Payload()
-    content = page_content([plan], ["plan"], payload, triads=_TRIADS)
+    content = page_content([plan], ["plan"], payload, triads=_TRIADS, with_map=False)
     picture = still(plan.robot, plan.trajectory, plan.obstacles, content["camera"], [])
     live = payload.pack({**content, "live": True})
     page = _assemble(title, describe(plan), live, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))

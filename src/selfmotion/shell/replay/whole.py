@@ -35,6 +35,9 @@ _ALIKE = 5e-4
 def facts(plan: Plan) -> dict[str, Cell]:
     """Return what a reader wants to know of a plan: label → number and remark."""
     report, certificate = plan.report, plan.certificate
+    if not certificate.findings:
+        # An arm that stands, for a page without a motion.
+        return {"verdict": (certificate.verdict, "")}
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
     rows["cost"] = _compared(report.cost, report.initial_cost)
     if report.remaining is not None and certificate.verified:

@@ -150,9 +150,18 @@ def _merge(written: Any, values: Mapping[str, Any]) -> None:
         del written[key]
     for key, value in values.items():
         if key not in written:
-            written[key] = value
+            written[key] = _inline(value) if isinstance(value, dict) else value
         else:
             _merge_item(written, key, value)
+
+
+def _inline(value: dict[str, Any]) -> Any:
+    """Return a new table as poses are written: in one line."""
+    import tomlkit
+
+    table = tomlkit.inline_table()
+    table.update(value)
+    return table
 
 
 def _merge_item(written: Any, key: Any, value: Any) -> None:

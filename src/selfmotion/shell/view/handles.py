@@ -17,6 +17,8 @@ from selfmotion.shell.view.poses import read_pose, rounded, write_pose
 
 # Of more waypoints none is dragged: they would hide the path.
 _MOST_WAYPOINTS = 40
+# A pose as near as this to the one before is the same [m].
+_SAME = 1e-7
 # Tool motions that begin where the arm does, unless they say where.
 _SHAPES = ("circle", "line", "spiral")
 # The node of the page below which the plan is drawn.
@@ -88,6 +90,8 @@ def dragged(document: Mapping[str, Any], handle: Handle, shown: SE3) -> dict[Key
     A start that is given does not fit a path that is elsewhere: it becomes free.
     """
     pose = handle.prefix.inverse() * shown
+    if np.abs(pose.homogeneous - handle.pose.homogeneous).max() < _SAME:
+        return {}
     match handle.kind:
         case "waypoint":
             values: dict[Keys, Any] = {

@@ -1,11 +1,12 @@
 """The planner of the page: what a document says is planned again whenever it is changed.
 
-First coarsely, near the motion before; then in whole. The whole plan is made anew, just as
+First coarsely: the motion before, put onto the new path by Newton's method; then in whole. The whole plan is made anew, just as
 `selfmotion plan` does, so that the one that is shown in the end is `plan()` of what is saved: of
 the ways that lead to it, nothing is left.
 """
 
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,11 +20,12 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, Report, retime
+from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import job_of
 
-# A coarse plan is what is found near the one before in so many evaluations and so long [s].
-_EVALUATIONS, _DEADLINE = 4, 0.06
+# Times of a coarse motion.
+_TIMES = 41
 # What takes longer is told where nothing else is asked for in this time [s].
 _CALM = 0.25
 # So many arms are kept for documents to come: one for each place of a base that is dragged.
@@ -131,6 +133,11 @@ class Planning:
                 self.answer(request)
             except _NewerRequest:
                 continue
+            except Exception as error:
+                # A fault of the program ends this plan, not the page.
+                traceback.print_exc()
+                words = f"selfmotion failed, which is a fault of the program: {error}"
+                self._tell(Found(request, "none", words, None, None))
 
     def answer(self, request: Request) -> None:
         """Tell of the motions that are found for a request."""
@@ -151,12 +158,12 @@ class Planning:
         coarse = self._coarse(job.problem)
         self._leave(request)
         if coarse is not None:
-            self._tell(Found(request, "coarse", coarse.certificate.verdict, coarse, job))
+            self._tell(Found(request, "coarse", coarse.report.message, coarse, job))
         self._leave(request)
         try:
             found = self._whole(request, job)
         except SelfmotionError as error:
-            words = self._told(error)
+            words = f"not verified: {self._told(error)}"
             stands = standing(job.problem, self.last, words)
             self._tell(Found(request, "none", words, stands, job))
             return
@@ -177,18 +184,12 @@ class Planning:
 
     def _coarse(self, problem: Problem) -> Plan | None:
         """Return a motion near the one before; None where there is none."""
-        if self.last is None or self.last.robot.joint_names != problem.robot.joint_names:
+        last, robot = self.last, problem.robot
+        if last is None or last.robot.joint_names != robot.joint_names:
             return None
-        try:
-            return plan(
-                problem,
-                warm_start=self.last,
-                max_evaluations=_EVALUATIONS,
-                deadline=_DEADLINE,
-            )
-        except SelfmotionError:
-            # What there is to be said the whole plan says.
+        if not problem.follows.is_plain:
             return None
+        return coarse(problem, last.trajectory)
 
     def _whole(self, request: Request, job: PlanRequest) -> Plan:
         def stage(_: str, __: int, ___: int) -> None:
@@ -210,6 +211,26 @@ class Planning:
         return str(error).removeprefix(f"{self._file}: ")
 
 
+def coarse(problem: Problem, before: Trajectory) -> Plan:
+    """Return the motion before, put onto the path of a problem time by time; nothing is proved.
+
+    Its message says where it cannot be: where Newton's method finds no configuration near, which
+    stays where it was then.
+    """
+    robot, follows, path = problem.robot, problem.follows, problem.path
+    share = np.linspace(0.0, 1.0, _TIMES)
+    times = share * path.duration
+    near = before(before.t[0] + share * (before.t[-1] - before.t[0]))
+    manifold = Manifold(follows, robot.lower, robot.upper)
+    reached, arrived = manifold.project(near, follows.targets(times), held=follows.held(times))
+    q = np.where(arrived[:, None], reached, near)
+    motion = Trajectory(times, q, np.gradient(q, times, axis=0), robot.joint_names)
+    words = "planning …"
+    if not arrived.all():
+        words = f"planning …; out of reach near the motion before, from t = {times[~arrived][0]:.3g} s"
+    return unproved(problem, motion, words)
+
+
 def standing(problem: Problem, last: Plan | None, words: str) -> Plan:
     """Return a plan in which the arm stands, for a page that has no motion to show.
 
@@ -222,9 +243,12 @@ def standing(problem: Problem, last: Plan | None, words: str) -> Plan:
     elif last is not None and last.robot.joint_names == robot.joint_names:
         q = last.trajectory.q[0]
     still = np.tile(q, (2, 1))
-    motion = Trajectory(
-        np.array([0.0, duration]), still, np.zeros_like(still), robot.joint_names
-    )
+    motion = Trajectory(np.array([0.0, duration]), still, np.zeros_like(still), robot.joint_names)
+    return unproved(problem, motion, words)
+
+
+def unproved(problem: Problem, motion: Trajectory, words: str) -> Plan:
+    """Return a plan of a motion of which nothing is proved; its certificate says why."""
     nothing = Extreme(0.0, 0.0, "")
     certificate = Certificate(
         nothing,

@@ -49,15 +49,16 @@ class Shown:
             **state,
         }
         if found.plan is not None:
-            content |= self._plan(found.plan, payload, brief=found.is_brief)
+            content |= self._plan(found.plan, payload, brief=found.is_brief, is_coarse=found.kind == "coarse")
             content |= {"handles": handles_json(found.request.document, found.plan)}
         return payload.data(content)
 
-    def _plan(self, plan: Plan, payload: Payload, *, brief: bool) -> Json:
+    def _plan(self, plan: Plan, payload: Payload, *, brief: bool, is_coarse: bool) -> Json:
         content = plan_content(
             plan, "plan", payload, radius=self._radius, triads=_TRIADS, brief=brief
         )
-        content["stopped"] = list(stopping(plan, payload, self._radius))
+        if not (is_coarse or plan.certificate.verified):
+            content["stopped"] = list(stopping(plan, payload, self._radius))
         # A page may miss a message when the next one is there: all that come later say it, too.
         self._has_changed |= plan.robot is not self._robot
         if self._has_changed:
@@ -75,12 +76,10 @@ def handles_json(document: Mapping[str, Any], plan: Plan) -> list[Json]:
 
 
 def stopping(plan: Plan, payload: Payload, radius: float) -> Iterator[Json]:
-    """Return the commands that draw in red what stops a plan; none for one that is verified.
+    """Return the commands that draw in red what stops a plan.
 
     What of the path no motion reaches, and where the tool is when a requirement is not kept.
     """
-    if plan.certificate.verified:
-        return
     look = three.material(_RED, roughness=0.9)
     path, follow = plan.problem.path, plan.problem.follows.items[0]
     base = follow.chain.base_placement
