@@ -38,7 +38,7 @@ _TRIADS, _MOST_TRIADS = 7, 1000
 # three.js, as `make three` takes it from its own package; the page's own scripts.
 _THREE = "three/three.min.js"
 _LIVE = ("handles.js", "live.js")
-_SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "page.js")
+_SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "tools.js", "page.js")
 
 
 def replay_html(

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from selfmotion.basics import FileFormatError, read_document, text_of, write_document, write_text
 
@@ -110,12 +110,9 @@ class Edited:
 def at(document: Any, keys: Keys) -> Any:
     """Return the value at the end of a way; None where there is none."""
     for key in keys:
-        if isinstance(document, Mapping) and key in document:
-            document = document[key]
-        elif isinstance(document, list) and isinstance(key, int) and key < len(document):
-            document = document[key]
-        else:
+        if not _leads(document, key) or (isinstance(document, Mapping) and key not in document):
             return None
+        document = document[key]
     return document
 
 
@@ -123,23 +120,24 @@ def _set(document: Any, keys: Keys, value: Any) -> None:
     *way, last = keys
     node = document
     for key in way:
-        if isinstance(node, dict):
-            node = node.setdefault(key, {})
-        elif isinstance(node, list) and isinstance(key, int) and key < len(node):
-            node = node[key]
-        else:
+        if not _leads(node, key):
             _refuse(keys, node)
+        node = node.setdefault(key, {}) if isinstance(node, dict) else node[key]
+    if not _leads(node, last):
+        _refuse(keys, node)
     if isinstance(node, dict) and value is None:
         node.pop(last, None)
-    elif isinstance(node, dict) or (
-        isinstance(node, list) and isinstance(last, int) and last < len(node)
-    ):
-        node[last] = value
     else:
-        _refuse(keys, node)
+        node[last] = value
 
 
-def _refuse(keys: Keys, node: Any) -> None:
+def _leads(node: Any, key: str | int) -> bool:
+    """Whether a key can be one of a table, or is a place in a list."""
+    is_place = isinstance(node, list) and isinstance(key, int) and key < len(node)
+    return isinstance(node, Mapping) or is_place
+
+
+def _refuse(keys: Keys, node: Any) -> NoReturn:
     name = ".".join(map(str, keys))
     raise FileFormatError(f"{name}: leads through {node!r}, expected a table or a list")
 

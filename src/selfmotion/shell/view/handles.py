@@ -94,9 +94,7 @@ def dragged(document: Mapping[str, Any], handle: Handle, shown: SE3) -> dict[Key
         return {}
     match handle.kind:
         case "waypoint":
-            values: dict[Keys, Any] = {
-                handle.keys: rounded(pose.translation, str(handle.keys[-2]))
-            }
+            values: dict[Keys, Any] = {handle.keys: rounded(pose.translation, str(handle.keys[-2]))}
         case "path":
             values = _moved_shape(document, handle, pose)
         case _:

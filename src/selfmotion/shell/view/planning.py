@@ -1,8 +1,8 @@
 """The planner of the page: what a document says is planned again whenever it is changed.
 
-First coarsely: the motion before, put onto the new path by Newton's method; then in whole. The whole plan is made anew, just as
-`selfmotion plan` does, so that the one that is shown in the end is `plan()` of what is saved: of
-the ways that lead to it, nothing is left.
+First coarsely: the motion before, put onto the new path by Newton's method; then in whole. The
+whole plan is made anew, just as `selfmotion plan` does, so that the one that is shown in the end
+is `plan()` of what is saved: of the ways that lead to it, nothing is left.
 """
 
 import threading
@@ -178,9 +178,7 @@ class Planning:
         with self._change:
             if self._thread.is_alive():
                 self._change.wait(_CALM)
-        return not self._closed and (
-            self._wanted is None or self._wanted.number == request.number
-        )
+        return not self._closed and (self._wanted is None or self._wanted.number == request.number)
 
     def _coarse(self, problem: Problem) -> Plan | None:
         """Return a motion near the one before; None where there is none."""
@@ -227,7 +225,9 @@ def coarse(problem: Problem, before: Trajectory) -> Plan:
     motion = Trajectory(times, q, np.gradient(q, times, axis=0), robot.joint_names)
     words = "planning …"
     if not arrived.all():
-        words = f"planning …; out of reach near the motion before, from t = {times[~arrived][0]:.3g} s"
+        words = (
+            f"planning …; out of reach near the motion before, from t = {times[~arrived][0]:.3g} s"
+        )
     return unproved(problem, motion, words)
 
 

@@ -40,9 +40,7 @@ def write_pose(value: Any, pose: SE3) -> dict[str, Any]:
     same = np.linalg.norm(pin.log3(before.rotation.T @ pose.rotation)) < _SAME
     if not (same and isinstance(value, Mapping)):
         degrees = any(name.endswith("_deg") for name in given if _names(name))
-        given = {
-            name: item for name, item in given.items() if name == key or not _names(name)
-        }
+        given = {name: item for name, item in given.items() if name == key or not _names(name)}
         angles = pin.rpy.matrixToRpy(pose.rotation)
         if np.any(np.abs(angles) > 0.0):
             name = "rpy_deg" if degrees or value is None else "rpy"

@@ -73,6 +73,9 @@ def serve(
         webbrowser.open(address)
     try:
         server.run(sockets=[bound])
+    except KeyboardInterrupt:
+        # The way in which this ends.
+        pass
     finally:
         bound.close()
         session.close()

@@ -14,10 +14,10 @@ from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
 from selfmotion.shell.view.document import Edited
-from selfmotion.shell.view.handles import dragged, handles_of
+from selfmotion.shell.view.handles import Handle, dragged, handles_of
 from selfmotion.shell.view.planning import Found, Planning, Request
 from selfmotion.shell.view.shown import Shown
-from selfmotion.shell.view.sliders import sliders_of
+from selfmotion.shell.view.sliders import Slider, sliders_of
 from selfmotion.shop.controllers import write_motion
 
 # Files that motions are exported to, by suffix.
@@ -47,27 +47,26 @@ class Session:
         self._begun = dict(self.edited.document)
         self._number = 0
         self._found: Found | None = None
-        self._known: Found | None = None
+        # The last plan of a document that describes a problem, and what of that can be changed.
+        self._known: Plan | None = None
+        self._handles: dict[str, Handle] = {}
+        self._sliders: dict[str, Slider] = {}
         self._send: Callable[[bytes], None] | None = None
         self._lock = threading.RLock()
         self._planning = Planning(file, allow_code, self._take)
-        # The first plan is made before there is a page, so that its faults are told at once.
-        self._planning.answer(Request(0, self.edited.document))
-        if self._known is None:
-            words = self._found.words if self._found is not None else ""
-            raise ProblemError(f"{file}: {words}")
-        plan = self._plan
-        self._handles = handles_of(self.edited.document, plan.problem)
+        plan = self._first_plan()
         self._sliders = sliders_of(self.edited.document, self._begun)
         self._html, radius = live_html(plan, title=file.name)
         self._shown = Shown(radius, plan.robot)
         self._planning.start()
 
-    @property
-    def _plan(self) -> Plan:
-        if self._known is None or self._known.plan is None:
-            raise PlanError("there is no plan yet; wait until the page says what came of it")
-        return self._known.plan
+    def _first_plan(self) -> Plan:
+        """Plan before there is a page; what is no problem at all is told at once."""
+        self._planning.answer(Request(0, self.edited.document))
+        if self._known is None:
+            words = "" if self._found is None else self._found.words
+            raise ProblemError(f"{self.edited.file}: {words}")
+        return self._known
 
     @property
     def found(self) -> Found | None:
@@ -199,7 +198,7 @@ class Session:
         with self._lock:
             self._found = found
             if found.plan is not None:
-                self._known = found
+                self._known = found.plan
                 self._handles = handles_of(found.request.document, found.plan.problem)
         self._tell()
 
@@ -224,5 +223,3 @@ def _pose(matrix: Any) -> SE3:
         raise ProblemError(f"matrix: is {told(matrix)}, expected that of a pose")
     left, _, right = np.linalg.svd(turn)
     return SE3(left @ right, values[:3, 3])
-
-

@@ -39,7 +39,7 @@ class Shown:
         self._has_changed = False
 
     def message(self, found: Found, state: Json) -> bytes:
-        """Return what the page is told of what was found, and of the state of the document."""
+        """Return what was found, and the state of the document, as the page reads them."""
         payload = Payload()
         content: Json = {
             "number": found.request.number,
@@ -49,7 +49,9 @@ class Shown:
             **state,
         }
         if found.plan is not None:
-            content |= self._plan(found.plan, payload, brief=found.is_brief, is_coarse=found.kind == "coarse")
+            content |= self._plan(
+                found.plan, payload, brief=found.is_brief, is_coarse=found.kind == "coarse"
+            )
             content |= {"handles": handles_json(found.request.document, found.plan)}
         return payload.data(content)
 
@@ -102,4 +104,3 @@ def stopping(plan: Plan, payload: Payload, radius: float) -> Iterator[Json]:
 
 def _in_frame(base: Any, samples: Any) -> Array:
     return np.asarray(samples.translation @ base.rotation.T + base.translation)
-

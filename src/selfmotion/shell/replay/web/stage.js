@@ -57,6 +57,43 @@ class Stage {
     this.castShadow(`${plan.root}/obstacles`);
   }
 
+  // Draw a plan in place of another one at the same node.
+  replace(plan) {
+    this.viewer.remove(plan.root);
+    this.marked = [];
+    this.add(plan);
+  }
+
+  // Draw objects in place of those at their nodes.
+  redraw(commands) {
+    for (const { path } of commands) this.viewer.remove(path);
+    for (const command of commands) this.viewer.run(command, this.meshes);
+    this.castShadow(`${ROOT}/robot`);
+  }
+
+  // The arm without its colours, as long as it shows an older motion, or one that is not verified.
+  setGrey(grey) {
+    this.find(`${ROOT}/robot`).traverse(({ isMesh, material, userData }) => {
+      if (!isMesh || material.depthTest === false) return;
+      userData.color ??= material.color.getHex();
+      const { r, g, b } = new THREE.Color(userData.color);
+      const light = 0.25 + 0.35 * ((r + g + b) / 3);
+      if (grey) material.color.setRGB(light, light, light);
+      else material.color.setHex(userData.color);
+    });
+    this.viewer.draw();
+  }
+
+  // Draw a line through points, over all that is in front of it.
+  line(path, points, color) {
+    this.viewer.remove(path);
+    const geometry = new THREE.BufferGeometry().setFromPoints(points);
+    const line = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color, depthTest: false }));
+    line.renderOrder = 1;
+    this.find(path).add(line);
+    this.viewer.draw();
+  }
+
   castShadow(path) {
     this.find(path).traverse((object) => { object.castShadow = true; });
   }

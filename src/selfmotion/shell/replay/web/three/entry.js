@@ -1,7 +1,7 @@
 // What the pages take of three.js; `make three` makes three.min.js of it.
 
 export {
-  AxesHelper, Box3, BoxGeometry, BufferAttribute, BufferGeometry, ColorManagement, CylinderGeometry, DirectionalLight,
+  AxesHelper, Box3, BoxGeometry, BufferAttribute, BufferGeometry, Color, ColorManagement, CylinderGeometry, DirectionalLight,
   Group, HemisphereLight, LatheGeometry, LineBasicMaterial, LineSegments, LinearSRGBColorSpace, MathUtils, Matrix4, Mesh,
   MeshBasicMaterial, MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, PlaneGeometry, Quaternion, Raycaster,
   Scene, ShadowMaterial, SphereGeometry, Vector2, Vector3, Vector4, WebGLRenderer,
