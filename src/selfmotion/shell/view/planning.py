@@ -76,7 +76,7 @@ class Found:
     is_brief: bool = True
 
 
-class _NewerRequest(BaseException):
+class NewerRequest(BaseException):
     """Leaves a plan that nobody waits for any more; no error, so that nothing catches it."""
 
 
@@ -131,7 +131,7 @@ class Planning:
             done = request.number
             try:
                 self.answer(request)
-            except _NewerRequest:
+            except NewerRequest:
                 continue
             except Exception as error:
                 # A fault of the program ends this plan, not the page.
@@ -203,7 +203,7 @@ class Planning:
     def _leave(self, request: Request) -> None:
         wanted = self._wanted
         if self._closed or (wanted is not None and wanted.number != request.number):
-            raise _NewerRequest
+            raise NewerRequest
 
     def _told(self, error: SelfmotionError) -> str:
         return str(error).removeprefix(f"{self._file}: ")

@@ -18,7 +18,7 @@ class Handles {
     this.controls = new THREE.TransformControls(viewer.camera, canvas);
     this.controls.setSize(0.75);
     viewer.scene.add(this.controls.getHelper());
-    this.controls.addEventListener("change", () => viewer.draw());
+    this.controls.addEventListener("change", () => viewer.draw(false));
     this.controls.addEventListener("dragging-changed", ({ value }) => this.grip(value));
     this.controls.addEventListener("objectChange", () => this.dragged());
     // A press that is no drag of the view chooses what is under it.

@@ -11,6 +11,7 @@ class Viewer {
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.autoUpdate = false;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.setPixelRatio(window.devicePixelRatio);
     element.append(this.renderer.domElement);
@@ -20,7 +21,7 @@ class Viewer {
     this.camera = new THREE.PerspectiveCamera(36, 1, 0.01, 100);
     this.camera.up.set(0, 0, 1);
     this.controls = new THREE.OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("change", () => this.draw(false));
     // What is done just before each picture.
     this.before = () => {};
   }
@@ -76,8 +77,9 @@ class Viewer {
     return this.geometries.get(given.mesh);
   }
 
-  // Draw with the next picture of the screen.
-  draw() {
+  // Draw with the next picture of the screen; shadows stay where only the view has moved.
+  draw(moved = true) {
+    if (moved) this.renderer.shadowMap.needsUpdate = true;
     if (this.asked) return;
     this.asked = requestAnimationFrame(() => this.render());
   }
