@@ -76,11 +76,17 @@ def path_poses(problem: Any) -> list[SE3]:
     ]
 
 
+def document_of(given: dict[str, Any]) -> Edited:
+    """Return a document that is in no file."""
+    edited = Edited.__new__(Edited)
+    edited.document, edited._before, edited._past = copy.deepcopy(given), None, []
+    return edited
+
+
 def changed(given: dict[str, Any], name: str, shown: SE3) -> tuple[dict[str, Any], Any]:
     """Return a document after a drag, and its problem."""
     handle = handles_of(given, job_of(given).problem)[name]
-    edited = Edited.__new__(Edited)
-    edited.document, edited._before, edited._past = copy.deepcopy(given), None, []
+    edited = document_of(given)
     edited.change(dragged(given, handle, shown), final=True)
     return edited.document, job_of(edited.document).problem
 
@@ -125,6 +131,24 @@ def test_a_handle_that_was_not_moved_changes_nothing(case: str) -> None:
     for name, handle in handles_of(given, job_of(given).problem).items():
         document, _ = changed(given, name, handle.prefix * handle.pose)
         assert document == given, name
+
+
+def test_a_long_drag_ends_where_a_short_one_does() -> None:
+    """Handles are those of the plan that was shown when it began; the document moves on."""
+    for case in ("a circle about a center", "a line"):
+        given = CASES[case]
+        handle = handles_of(given, job_of(given).problem)["path"]
+        shown = handle.prefix * handle.pose * BY
+        halfway = SE3(shown.rotation, shown.translation + np.array([0.1, 0.0, 0.0]))
+        edited = document_of(given)
+        for pose in (halfway, shown):
+            edited.change(dragged(edited.document, handle, pose), final=False)
+        direct = changed(given, "path", shown)[1].path
+        times = np.linspace(0.0, direct.duration, 5)
+        found = job_of(edited.document).problem.path.samples(times)
+        np.testing.assert_allclose(
+            found.translation, direct.samples(times).translation, atol=2.0 * NEAR
+        )
 
 
 def test_a_start_that_does_not_fit_any_more_becomes_free() -> None:

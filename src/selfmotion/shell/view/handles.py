@@ -148,14 +148,16 @@ def _moved_shape(document: Mapping[str, Any], handle: Handle, pose: SE3) -> dict
     """Return a shape that begins at a pose: its other points go along, its tool turns."""
     path = document["path"]
     values: dict[Keys, Any] = {handle.keys: write_pose(path.get("start"), pose)}
-    by = pose.translation - handle.pose.translation
+    # Of a drag that goes on the document has moved, whatever was planned by then.
+    before = handle.pose if "start" not in path else read_pose(path["start"])
+    by = pose.translation - before.translation
     for key in ("center", "center_mm"):
         if key in path:
             scale = 1e-3 if key.endswith("_mm") else 1.0
             values["path", key] = rounded(scale * np.array(path[key], dtype=np.float64) + by, key)
     if "end" in path:
         end = read_pose(path["end"])
-        turn = handle.pose.rotation.T @ pose.rotation
+        turn = before.rotation.T @ pose.rotation
         values["path", "end"] = write_pose(
             path["end"], SE3(end.rotation @ turn, end.translation + by)
         )

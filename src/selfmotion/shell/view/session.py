@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
@@ -45,7 +46,7 @@ class Session:
     def __init__(self, file: Path, *, allow_code: bool = False) -> None:
         self.edited = Edited(file)
         self._begun = dict(self.edited.document)
-        self._number = 0
+        self._number = self._mark = 0
         self._found: Found | None = None
         # The last plan of a document that describes a problem, and what of that can be changed.
         self._known: Plan | None = None
@@ -90,6 +91,11 @@ class Session:
             if self._send is not None:
                 return False
             self._send = send
+            # Another page counts anew.
+            self._mark = 0
+            if self._found is not None:
+                request = replace(self._found.request, mark=0)
+                self._found = replace(self._found, request=request)
         self._tell()
         return True
 
@@ -108,7 +114,11 @@ class Session:
         """
         if not isinstance(asked, Mapping):
             raise ProblemError(f"the page asks for {told(asked)}, expected a table")
+        mark = asked.get("mark", 0)
+        if isinstance(mark, bool) or not isinstance(mark, int):
+            raise ProblemError(f"mark: is {told(mark)}, expected a whole number")
         with self._lock:
+            self._mark = mark
             match asked.get("do"):
                 case "drag":
                     self._drag(asked)
@@ -182,7 +192,7 @@ class Session:
 
     def _ask(self) -> None:
         self._number += 1
-        self._planning.ask(Request(self._number, self.edited.document))
+        self._planning.ask(Request(self._number, self.edited.document, self._mark))
 
     @property
     def _state(self) -> Json:

@@ -26,7 +26,7 @@ class Handles {
     canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
     canvas.addEventListener("pointerup", (event) => {
       const still = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 4;
-      if (still && !this.gripped && !this.controls.axis) this.pick(event);
+      if (still && !this.gripped && !this.controls.axis && !stage.isMeasured) this.pick(event);
       pressed = undefined;
     });
   }

@@ -12,7 +12,8 @@ class Live {
     this.page = page;
     this.token = new URLSearchParams(location.search).get("token") ?? "";
     this.sliders = new Map();
-    this.number = 0;
+    // What was asked is counted; what is shown answers one of these.
+    this.asked = this.answered = 0;
     document.documentElement.classList.add("live");
     get("change").hidden = false;
     if (page.stage) {
@@ -52,8 +53,11 @@ class Live {
   ask(asked) {
     if (this.socket.readyState !== WebSocket.OPEN) return;
     this.say("");
-    if (asked.do !== "save") this.wait();
-    this.socket.send(JSON.stringify(asked));
+    if (asked.do !== "save") {
+      this.asked += 1;
+      this.wait();
+    }
+    this.socket.send(JSON.stringify({ ...asked, mark: this.asked }));
   }
 
   say(text, bad = false) {
@@ -72,6 +76,9 @@ class Live {
   hear(answer) {
     if (answer.error) {
       this.say(answer.error, true);
+      // Nothing was changed: what is shown is still right.
+      this.asked = this.answered;
+      if (this.last) this.judge(this.last);
       return;
     }
     if (answer.saved) this.say("Saved.");
@@ -88,8 +95,9 @@ class Live {
   // A plan, or a first motion, or what stops it.
   take(message) {
     const { page } = this;
-    const { kind, words, brief, plans, handles } = message;
+    const { kind, brief, plans, handles } = message;
     const coarse = kind === "coarse";
+    this.answered = message.answers;
     this.state(message);
     if (plans) {
       this.handles?.settle();
@@ -98,17 +106,22 @@ class Live {
       this.drawHandles(handles);
       if (coarse) this.handles?.carry();
     }
-    const verified = kind === "whole" && plans[0].verified;
-    get("verdict").textContent = words;
-    get("verdict").className = coarse ? "coarse" : verified ? "verified" : "";
-    page.stage?.setGrey(!verified);
     if (!coarse) this.drawNumbers(message.table);
-    get("figures").classList.toggle("stale", coarse);
     get("plots").classList.toggle("stale", brief);
-    this.number = message.number;
-    document.documentElement.dataset.live = coarse ? "coarse" : verified ? "verified" : "stopped";
-    document.documentElement.dataset.number = message.number;
     document.documentElement.dataset.brief = brief;
+    this.judge(message);
+  }
+
+  // Say what is shown: verified only where it answers what was asked last.
+  judge(message) {
+    this.last = message;
+    const open = message.kind === "coarse" || this.answered !== this.asked;
+    const verified = message.kind === "whole" && message.plans[0].verified && !open;
+    get("verdict").textContent = open && message.kind !== "coarse" ? "planning …" : message.words;
+    get("verdict").className = open ? "coarse" : verified ? "verified" : "";
+    get("figures").classList.toggle("stale", open);
+    this.page.stage?.setGrey(!verified);
+    document.documentElement.dataset.live = open ? "coarse" : verified ? "verified" : "stopped";
   }
 
   drawNumbers(table) {
@@ -157,7 +170,9 @@ class Live {
     for (const slider of sliders) {
       const known = this.sliders.get(slider.name);
       Object.assign(known.slider, slider);
-      if (document.activeElement !== known.input || !known.moved) known.input.value = place(slider, slider.value);
+      // What was slid since then is newer than what is told.
+      if (this.asked !== this.answered) continue;
+      known.input.value = place(slider, slider.value);
       known.output.textContent = number(slider.value, slider.unit);
     }
   }
@@ -172,16 +187,14 @@ class Live {
       const input = element(line, "input", {
         type: "range", min: 0, max: STEPS, step: 1, "data-slider": slider.name, "aria-label": slider.name });
       const output = element(line, "output", {});
-      const known = { slider, input, output, moved: false };
       const slide = (final) => {
-        known.moved = !final;
         const value = at(slider, Number(input.value));
         output.textContent = number(value, slider.unit);
         this.ask({ do: "slide", name: slider.name, value, final });
       };
       input.addEventListener("input", () => slide(false));
       input.addEventListener("change", () => slide(true));
-      this.sliders.set(slider.name, known);
+      this.sliders.set(slider.name, { slider, input, output });
     }
   }
 

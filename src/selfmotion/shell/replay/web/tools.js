@@ -56,7 +56,7 @@ class Measure {
   }
 
   set(on) {
-    this.on = on;
+    this.on = this.stage.isMeasured = on;
     this.clear();
     get("measure").setAttribute("aria-pressed", on);
     get("measured").textContent = on ? "press two points" : "";
