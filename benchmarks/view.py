@@ -1,7 +1,7 @@
 """The page of `selfmotion view`: from the release of a handle or slider to the verdict.
 
 `make bench NAME=view`. Each handle of each document is dragged, and each slider moved, ten times,
-as a hand does it: at 30 times a second, then released. What is timed is what the page waits for: its
+as a hand does it: 30 times a second, then released. What is timed is what the page waits for: its
 first motion while it is dragged, and the message that says verified (or what stops it) after the
 release, over the connection that the browser uses. Of each document the plan that is shown last is
 held against `plan()` of the file as it was saved.
