@@ -293,8 +293,11 @@ LIT = """() => {
 
 def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     plan = shelf_plan()
-    clearance = plan.problem.constraints[-1]
+    *others, clearance = plan.problem.constraints
     world = clearance.model(plan.robot)
+    # Nearer than twice what is asked: of what is farther apart nothing is coloured.
+    asked = (*others, Clearance(clearance.obstacles, 1.0))
+    plan = replace(plan, problem=replace(plan.problem, constraints=asked))
     page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):
         page.evaluate("t => replay.seek(t)", time)
@@ -305,6 +308,9 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
         assert float(said.split(", ")[1].removesuffix(" mm")) == pytest.approx(
             float(apart), rel=1e-2
         )
+        ends = np.array(page.evaluate("replay.stage.ends"))
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(expected.value, abs=1e-5)
+        assert page.locator(".apart span.near").inner_text() == said.split(", ")[1]
         bodies = [name.replace("/", "_") for name in (expected.first, expected.second)]
         lit = page.evaluate(LIT)
         assert lit
@@ -320,6 +326,8 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     page.keyboard.press("c")
     page.keyboard.press("2")
     links = set(CollisionModel(plan.robot).bodies)
+    assert page.evaluate(LIT) == [], "it asks for nothing"
+    assert page.locator(".apart span:not(.near)").count() == 1
     first, second = (
         page.locator("#pair").inner_text()[len("closest: ") :].split(",")[0].split(" and ")
     )

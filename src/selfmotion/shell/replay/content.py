@@ -8,6 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.result import Plan
+from selfmotion.problem.constraints import Clearance
 from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
@@ -43,6 +44,8 @@ _THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 _FRAME_LENGTH = 0.12
+# What stands around is in the first view unless it is so much larger than arm and path, as a floor.
+_PART = 2.0
 # Points of the curves of a brief page.
 _FEW = 101
 
@@ -89,6 +92,8 @@ class _Motion:
         self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
+        # How far apart bodies have to be [m].
+        self.asked = max((item.distance for item in _clearances(plan)), default=0.0)
         self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
         self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
 
@@ -117,7 +122,9 @@ def page_content(
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
     # A part is seen whole, a floor is not.
     around = [
-        corners for motion in motions for corners in scene.outlines(motion.obstacles, box.radius)
+        corners
+        for motion in motions
+        for corners in scene.outlines(motion.obstacles, _PART * box.radius)
     ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
@@ -174,6 +181,10 @@ def plan_content(
         "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
         "table": _facts([plan], whole),
     }
+
+
+def _clearances(plan: Plan) -> list[Clearance]:
+    return [item for item in plan.problem.all_constraints if isinstance(item, Clearance)]
 
 
 def _layers(motions: list[_Motion]) -> list[Json]:
@@ -251,7 +262,9 @@ def _plan(
             "matrix": payload.array(shown.ellipsoid),
             "tool": payload.array(shown.tool_in_world),
         },
-        "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "clearance": None
+        if motion.clearance is None
+        else _clearance(motion.clearance, payload) | {"asked": motion.asked},
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [
@@ -331,6 +344,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
         "t": payload.array(curve.t),
         "value": payload.array(curve.value),
         "pairs": curve.pairs,
+        "points": payload.array(curve.points),
     }
 
 

@@ -151,6 +151,7 @@ class Page {
     get("pair").hidden = !shown;
     if (!shown) {
       this.stage?.mark([], {});
+      this.stage?.connect();
       return;
     }
     const last = clearance.t.length - 1;
@@ -160,7 +161,11 @@ class Page {
     get("pair").classList.toggle("meet", apart <= 0);
     get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(1e3 * apart)} mm`
       : `${first} and ${second} meet`;
-    this.stage?.mark([first, second], this.plan.obstacles, apart <= 0);
+    // Coloured only where it matters: where they meet, or are nearer than twice what was asked.
+    const near = apart < 2 * clearance.asked;
+    this.stage?.mark(apart <= 0 || near ? [first, second] : [], this.plan.obstacles, apart <= 0);
+    const ends = [0, 3].map((from) => Array.from(clearance.points.subarray(6 * k + from, 6 * k + from + 3)));
+    this.stage?.connect(ends, `${format(1e3 * apart)} mm`, near || apart <= 0);
   }
 
   play() {
@@ -244,6 +249,7 @@ class Page {
     // Of these postures nobody has measured it.
     get("pair").hidden = true;
     this.stage?.mark([], {});
+    this.stage?.connect();
     for (const [stage, k] of this.sides) {
       const { selfMotion } = this.content.plans[k];
       if (selfMotion) stage.place(this.content.plans[k], this.now, step + (selfMotion.steps - 1) / 2);
@@ -259,6 +265,7 @@ class Page {
     get("pair").textContent = said;
     get("pair").classList.toggle("meet", cause !== "");
     this.stage?.mark(cause.split(" "), this.plan.obstacles, true);
+    this.stage?.connect();
     for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], this.now);
   }
 

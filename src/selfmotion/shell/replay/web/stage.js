@@ -31,6 +31,8 @@ class Stage {
     new ResizeObserver(() => this.resize()).observe(element);
     this.names = element.appendChild(document.createElement("div"));
     this.names.className = "names";
+    this.apart = element.appendChild(document.createElement("div"));
+    this.apart.className = "apart";
     this.meshes = content.meshes.map(decodeMesh);
     for (const command of content.commands) this.viewer.run(command, this.meshes);
     this.viewer.controls.addEventListener("start", () => { this.turned = true; });
@@ -84,6 +86,32 @@ class Stage {
     this.viewer.draw();
   }
 
+  // A line between two points with its number; without them none.
+  connect(ends, text = "", near = false) {
+    this.ends = ends;
+    this.apart.replaceChildren();
+    if (!ends) {
+      this.viewer.remove(`${ROOT}/apart`);
+      this.viewer.draw(false);
+      return;
+    }
+    const points = ends.map((point) => new THREE.Vector3(...point));
+    this.line(`${ROOT}/apart`, points, near ? 0xe8701a : 0x5b6f8f);
+    const span = document.createElement("span");
+    span.textContent = text;
+    span.classList.toggle("near", near);
+    this.apart.append(span);
+    this.follow();
+  }
+
+  // The number is where the line is, however the scene is looked at.
+  follow() {
+    const [span] = this.apart.children;
+    if (!span || !this.ends) return;
+    const [one, other] = this.ends.map((point) => new THREE.Vector3(...point));
+    this.write(span, one.lerp(other, 0.5));
+  }
+
   // Draw a line through points, over all that is in front of it.
   line(path, points, color) {
     this.viewer.remove(path);
@@ -123,7 +151,10 @@ class Stage {
 
   // Something is done just before each picture, where whatever it shows may be brought up to date.
   onRender(callback) {
-    this.viewer.before = () => callback(this.time);
+    this.viewer.before = () => {
+      callback(this.time);
+      this.follow();
+    };
   }
 
   seek(time) {
@@ -212,19 +243,22 @@ class Stage {
     this.viewer.draw();
   }
 
+  // Put a text where a point is seen; false where it is behind the eye.
+  write(text, point) {
+    const { x, y, z } = point.clone().project(this.viewer.camera);
+    const wide = this.element.clientWidth, high = this.element.clientHeight;
+    text.style.transform = `translate(${(0.5 + x / 2) * wide}px, ${(0.5 - y / 2) * high}px) translate(-50%, -50%)`;
+    return z <= 1;
+  }
+
   // Write the names of bodies where they are.
   label(paths) {
-    const { camera } = this.viewer;
-    const wide = this.element.clientWidth, high = this.element.clientHeight;
     this.names.replaceChildren(...Object.entries(paths).flatMap(([name, path]) => {
       const box = new THREE.Box3().setFromObject(this.find(path));
       if (box.isEmpty()) return [];
-      const seen = box.getCenter(new THREE.Vector3()).project(camera);
-      if (seen.z > 1) return [];
       const text = document.createElement("span");
       text.textContent = name;
-      text.style.transform = `translate(${(0.5 + seen.x / 2) * wide}px, ${(0.5 - seen.y / 2) * high}px) translate(-50%, -50%)`;
-      return [text];
+      return this.write(text, box.getCenter(new THREE.Vector3())) ? [text] : [];
     }));
   }
 
