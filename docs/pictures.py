@@ -11,10 +11,11 @@ import selfmotion as sm
 from selfmotion.shell.cli.runs import panda_past_a_box
 from selfmotion.shell.replay import render_png
 
-DOCS = Path(__file__).parent
-sys.path.insert(0, str(DOCS.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.layouts import chromium
 from support.views import served
+
+DOCS = Path(__file__).parent
 
 
 def plan_of(name: str) -> sm.Plan:
