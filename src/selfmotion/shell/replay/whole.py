@@ -96,6 +96,9 @@ def table(plans: list[Plan]) -> list[dict[str, Any]]:
 def describe(plan: Plan) -> str:
     """Return one sentence that tells a stranger what the page shows."""
     report = plan.report
+    if not plan.certificate.findings:
+        # There is no motion to describe.
+        return plan.certificate.verdict
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0
