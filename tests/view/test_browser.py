@@ -223,6 +223,10 @@ def test_joints_are_jogged_and_come_back(page: Any, server: Served) -> None:
     page.locator("[data-joint=panda_joint1]").fill("1.0")
     assert page.evaluate(place) != before
     assert "jogged by hand" in page.locator("#pair").inner_text()
+    # What is told of the plan later does not take it away.
+    jogged = page.evaluate(place)
+    page.evaluate("replay.live.take(replay.live.last)")
+    np.testing.assert_allclose(page.evaluate(place), jogged)
     page.evaluate("replay.seek(replay.now)")
     np.testing.assert_allclose(page.evaluate(place), before)
     page.locator("#jog summary").click()

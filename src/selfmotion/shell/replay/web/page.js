@@ -47,7 +47,7 @@ class Page {
   get duration() { return this.plan.duration; }
 
   // Show another plan in place of the first; what of it takes long to draw may come later.
-  replace({ brief, plans: [plan], scale, table, ellipsoidSize, tree, arm, joints, stopped = [] }) {
+  replace({ number, brief, plans: [plan], scale, table, ellipsoidSize, tree, arm, joints, stopped = [] }) {
     Object.assign(this.content, { plans: [plan], scale, ellipsoidSize, joints }, tree ? { tree } : {});
     if (this.stage) {
       if (arm) this.stage.redraw(arm);
@@ -59,7 +59,11 @@ class Page {
       this.makeTable();
       this.makeLegend();
     }
+    // What is told later of the same plan leaves the arm where it was put by hand.
+    const stood = this.standing && number === this.told ? this.stood : null;
+    this.told = number;
     this.choose(0, brief);
+    if (stood) this.stand(...stood);
   }
 
   choose(number, brief = false) {
@@ -260,6 +264,7 @@ class Page {
   // Stand in a configuration that the map has, with the bodies marked that meet there.
   stand(q, cause, said = `shown from the map: ${cause || "allowed"}`) {
     this.standing = q;
+    this.stood = [q, cause, said];
     // In the place of the closest pair: the map stays where it is under the pointer.
     get("pair").hidden = false;
     get("pair").textContent = said;
