@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check quick test test-site test-baseline lint format bench short wheel docs errors clean
+.PHONY: help demo check quick test test-site test-baseline lint format bench short wheel docs errors three clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -65,6 +65,17 @@ docs: $(READY)  ## the site, into out/site
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
 	PYTHONPATH=tests $(BIN)/python -m support.bad_inputs
+
+# What the pages take of three.js, from its own package; `entry.js` lists it.
+THREE := src/selfmotion/shell/replay/web/three
+THREE_VERSION := 0.187.0
+three:  ## three.js for the pages, from its package, into the source; needs npm
+	rm -rf out/three && mkdir -p out/three && cp $(THREE)/entry.js out/three
+	cd out/three && npm install --silent --no-save three@$(THREE_VERSION) esbuild@0.28.2
+	cd out/three && npx esbuild entry.js --bundle --minify --format=iife --global-name=THREE --target=es2022 \
+		--banner:js="/* three.js $(THREE_VERSION), MIT licence, Copyright 2010-2026 three.js authors: see LICENSE beside this file. */" \
+		--legal-comments=none --log-level=warning --outfile=$(CURDIR)/$(THREE)/three.min.js
+	cp out/three/node_modules/three/LICENSE $(THREE)/LICENSE
 
 clean:  ## the environment and out/ go
 	rm -rf $(VENV) out

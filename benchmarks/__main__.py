@@ -114,6 +114,10 @@ BENCHMARKS = {
         "margins of 5 mm and 0.5° of 40 plans, displaced and judged; what they have to cost",
         Run("bought_margins.py", short="--count 1 --displacements 2"),
     ),
+    "view": Benchmark(
+        "the page of `selfmotion view`: from the release of a handle or slider to the verdict",
+        Run("view.py", short="--repeats 1"),
+    ),
     "redundancy_map": Benchmark(
         "redundancy maps of the suite's problems against brute force, pixel by pixel",
         Run(

@@ -23,6 +23,7 @@ BESIDE = (
     "errors.md",
     "replay.png",
     "two_motions.png",
+    "view.png",
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
 GALLERY = (

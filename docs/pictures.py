@@ -3,11 +3,17 @@
 Needs a Chromium browser. Takes about a minute.
 """
 
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import selfmotion as sm
 from selfmotion.shell.cli.runs import panda_past_a_box
 from selfmotion.shell.replay import render_png
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from support.layouts import chromium
+from support.views import served
 
 DOCS = Path(__file__).parent
 
@@ -23,8 +29,27 @@ def plan_of(name: str) -> sm.Plan:
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
+def draw_view() -> None:
+    """Draw the page of the how-to's file, with a handle chosen."""
+    text = (DOCS / "pages" / "howto" / "view.md").read_text(encoding="utf-8")
+    problem = text.split('```toml title="post.toml"\n')[1].split("```")[0]
+    with TemporaryDirectory() as folder, chromium() as browser:
+        file = Path(folder) / "post.toml"
+        file.write_text(problem, encoding="utf-8")
+        with served(file) as server:
+            page = browser.new_page(
+                viewport={"width": 1400, "height": 900}, reduced_motion="reduce"
+            )
+            page.goto(server.address)
+            page.wait_for_selector("html[data-live=verified][data-brief=false]")
+            page.locator("[data-handle=post]").click()
+            page.evaluate("replay.seek(2.0)")
+            page.screenshot(path=DOCS / "view.png")
+
+
 def main() -> None:
-    """Draw a replay's page, then every named arm."""
+    """Draw a replay's page and the page that is changed, then every named arm."""
+    draw_view()
     shown = ("trace", "triads", "ghost")
     size = (1200, 900)
     plan = sm.plan(panda_past_a_box())

@@ -286,3 +286,24 @@ def test_what_touches_is_named_with_the_line_that_leaves_it_out(
         CollisionModel(panda, disabled=disabled_links(tmp_path / "panda.srdf")).touching(folded)
         == ()
     )
+
+
+def test_nearest_points_are_as_far_apart_as_the_bodies() -> None:
+    panda = load_robot("panda")
+    ball = Sphere("ball", np.array([0.5, 0.2, 0.9]), 0.05)
+    model = CollisionModel(panda, [ball])
+    rng = np.random.default_rng(0)
+    lower, upper = panda.finite_limits()
+    apart = 0
+    for q in rng.uniform(lower, upper, (40, panda.dof)):
+        found = model.distance(q)
+        if found.value <= 0.0:
+            continue
+        apart += 1
+        ends = model.nearest_points(q, found.first, found.second)
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(found.value, abs=1e-6)
+        if found.second == "ball":
+            assert np.linalg.norm(ends[1] - ball.pose.translation) == pytest.approx(0.05, abs=1e-5)
+    assert apart > 10
+    with pytest.raises(CollisionError, match="no pair that is checked"):
+        model.nearest_points(q, "ball", "ball")

@@ -8,12 +8,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from selfmotion.errors import ProblemError
 from selfmotion.model.collision import Box, CollisionModel
 from selfmotion.model.robot import NAMED_ARMS
 from selfmotion.planning.redundancy import LEGEND
 from selfmotion.problem.constraints import Clearance
 from selfmotion.result import Reason
-from selfmotion.shell.replay import notebook_html, write_replay
+from selfmotion.shell.replay import notebook_html, write_meshcat, write_replay
 from selfmotion.shop.controllers import read_motion
 from support.layouts import chromium
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
@@ -102,7 +103,7 @@ POSES = """() => {
   const found = {};
   const inverse = viewer.scene.matrixWorld.clone().invert();
   viewer.scene.updateMatrixWorld(true);
-  viewer.scene_tree.find(["selfmotion", "robot"]).object.children.forEach((node) => {
+  viewer.find(`/selfmotion/robot`).children.forEach((node) => {
     found[node.name] = inverse.clone().multiply(node.matrixWorld).toArray();
   });
   return found;
@@ -113,7 +114,7 @@ PLACES = """() => {
   const found = {};
   viewer.scene.updateMatrixWorld(true);
   const inverse = viewer.scene.matrixWorld.clone().invert();
-  viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.children.forEach((node) => {
+  viewer.find(`/selfmotion/plan0/obstacles`).children.forEach((node) => {
     node.traverse((object) => {
       if (object.isMesh) found[node.name] = inverse.clone().multiply(object.matrixWorld).toArray();
     });
@@ -139,10 +140,10 @@ def largest_difference(poses, plan, time):
 def test_links_are_where_pinocchio_has_them(pages, name):
     page = pages[name]
     plan = planar_plan() if name == "planar" else arm_plan(name)
-    assert page.evaluate("viewer.animator.duration") == pytest.approx(plan.trajectory.duration)
+    assert page.evaluate("replay.duration") == pytest.approx(plan.trajectory.duration)
     for share in (0.0, 0.137, 0.5, 0.81, 1.0):
         time = share * plan.trajectory.duration
-        page.evaluate("t => viewer.animator.seek(t)", time)
+        page.evaluate("t => replay.seek(t)", time)
         poses = page_poses(page)
         assert largest_difference(poses, plan, time) < 1e-4
         if 0 < share < 1:
@@ -153,7 +154,7 @@ def test_links_are_where_pinocchio_has_them(pages, name):
 def test_every_triangle_reaches_the_scene(pages):
     drawn = pages["ur5"].evaluate("""() => {
       let count = 0;
-      viewer.scene_tree.find(["selfmotion", "robot"]).object.traverse((object) => {
+      viewer.find(`/selfmotion/robot`).traverse((object) => {
         if (object.isMesh) count += object.geometry.index.count / 3;
       });
       return count;
@@ -164,18 +165,17 @@ def test_every_triangle_reaches_the_scene(pages):
 def test_pixels_change_with_time_and_come_back(open_page, files):
     page = open_page(files["planar"], viewport={"width": 320, "height": 400})
     shots = [
-        page.evaluate("t => { viewer.animator.seek(t); return viewer.capture_image(); }", t)
-        for t in (0.5, 2.0, 0.5)
+        page.evaluate("t => { replay.seek(t); return viewer.image(); }", t) for t in (0.5, 2.0, 0.5)
     ]
     assert shots[0] != shots[1]
     assert shots[0] == shots[2]
     page.keyboard.press("g")
-    ghost = page.evaluate("() => { viewer.animator.seek(0.5); return viewer.capture_image(); }")
+    ghost = page.evaluate("() => { replay.seek(0.5); return viewer.image(); }")
     assert ghost != shots[0]
 
 
 def time_of(page):
-    return page.evaluate("viewer.animator.actions[0].time")
+    return page.evaluate("replay.now")
 
 
 def box_of(seen):
@@ -207,7 +207,7 @@ def test_keys_slider_and_plots_keep_one_time(pages):
     box = box_of(page.locator(".plot svg").first)
     page.mouse.click(box["x"] + 52 + 0.25 * (box["width"] - 62), box["y"] + 60)
     assert time_of(page) == pytest.approx(0.5, abs=0.02)
-    page.evaluate("viewer.animator.seek(1.0); viewer.render()")
+    page.evaluate("replay.seek(1.0); viewer.render()")
     assert page.locator("#clock").inner_text() == "1.00 / 2.00 s"
     assert_quiet(page)
 
@@ -269,14 +269,14 @@ def test_plans_share_a_page(open_page, files):
     second = planar_plan(mu=30.0)
     assert page.locator("#choice button:not(#sides)").count() == 2
     page.locator("#choice button").nth(1).click()
-    page.evaluate("viewer.animator.seek(1.3)")
+    page.evaluate("replay.seek(1.3)")
     assert largest_difference(page_poses(page), second, 1.3) < 1e-4
     assert largest_difference(page_poses(page), planar_plan(), 1.3) > 1e-3
     cost = f"{second.report.cost:.4g}"
     assert cost in page.locator("#description").inner_text()
     page.keyboard.press("1")
     assert cost not in page.locator("#description").inner_text()
-    page.evaluate("viewer.animator.seek(1.3)")
+    page.evaluate("replay.seek(1.3)")
     assert largest_difference(page_poses(page), planar_plan(), 1.3) < 1e-4
     assert page.locator("#numbers thead th").all_inner_texts() == ["Plan A", "Plan B"]
     assert_quiet(page)
@@ -284,7 +284,7 @@ def test_plans_share_a_page(open_page, files):
 
 LIT = """() => {
   const names = [];
-  viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+  viewer.find(`/selfmotion`).traverse((object) => {
     if (object.material?.emissive?.getHex()) names.push(object.uuid);
   });
   return names;
@@ -293,8 +293,11 @@ LIT = """() => {
 
 def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     plan = shelf_plan()
-    clearance = plan.problem.constraints[-1]
+    *others, clearance = plan.problem.constraints
     world = clearance.model(plan.robot)
+    # Nearer than twice what is asked: of what is farther apart nothing is coloured.
+    asked = (*others, Clearance(clearance.obstacles, 1.0))
+    plan = replace(plan, problem=replace(plan.problem, constraints=asked))
     page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):
         page.evaluate("t => replay.seek(t)", time)
@@ -305,12 +308,15 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
         assert float(said.split(", ")[1].removesuffix(" mm")) == pytest.approx(
             float(apart), rel=1e-2
         )
+        ends = np.array(page.evaluate("replay.stage.ends"))
+        assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(expected.value, abs=1e-5)
+        assert page.locator(".apart span.near").inner_text() == said.split(", ")[1]
         bodies = [name.replace("/", "_") for name in (expected.first, expected.second)]
         lit = page.evaluate(LIT)
         assert lit
         assert all(any(f"/{body}/" in name for body in bodies) for name in lit)
         assert all(any(f"/{body}/" in name for name in lit) for body in bodies)
-    drawn = page.evaluate("""viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object
+    drawn = page.evaluate("""viewer.find(`/selfmotion/plan0/obstacles`)
       .children.map((node) => node.name)""")
     assert drawn == ["shelf", "ball", "post", "a_b", "part"]
     assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
@@ -320,13 +326,13 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     page.keyboard.press("c")
     page.keyboard.press("2")
     links = set(CollisionModel(plan.robot).bodies)
+    assert page.evaluate(LIT) == [], "it asks for nothing"
+    assert page.locator(".apart span:not(.near)").count() == 1
     first, second = (
         page.locator("#pair").inner_text()[len("closest: ") :].split(",")[0].split(" and ")
     )
     assert {first, second} <= links, "the second plan knows of no obstacles"
-    assert not page.evaluate(
-        'viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.visible'
-    )
+    assert not page.evaluate("viewer.find(`/selfmotion/plan0/obstacles`).visible")
     assert_quiet(page)
 
 
@@ -340,7 +346,7 @@ def test_bodies_that_meet_are_red(open_page, tmp_path):
     assert page.locator("#pair").inner_text().endswith("and block meet")
     colors = page.evaluate("""() => {
       const found = [];
-      viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+      viewer.find(`/selfmotion`).traverse((object) => {
         if (object.material?.emissive?.getHex()) found.push(object.material.emissive.getHex());
       });
       return found;
@@ -374,7 +380,7 @@ def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
     hand = robot.model.getFrameId("panda_hand", pin.FrameType.BODY)
     seen = []
     for time in (0.0, 1.3, 4.0):
-        page.evaluate("t => viewer.animator.seek(t)", time)
+        page.evaluate("t => replay.seek(t)", time)
         pin.framesForwardKinematics(robot.model, data, plan.trajectory(time))
         places = page.evaluate(PLACES)
         expected = (data.oMf[hand] * pose).homogeneous
@@ -399,7 +405,7 @@ def test_every_named_arm_is_drawn(open_page, pages, tmp_path, name):
     # Without the arm the picture is another one.
     shots = page.evaluate("""() => [true, false].map((visible) => {
       replay.stage.show("/selfmotion/robot", visible);
-      return viewer.capture_image();
+      return viewer.image();
     })""")
     assert shots[0] != shots[1]
     assert_quiet(page)
@@ -417,6 +423,25 @@ def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
     assert frame.locator("#notice").is_hidden()
     assert_quiet(page)
     context.close()
+
+
+def test_meshcat_shows_the_same_motion(open_page, tmp_path):
+    plan = planar_plan()
+    page = open_page(write_meshcat(plan, tmp_path / "meshcat.html"))
+    for time in (0.3, 1.7):
+        page.evaluate("t => { viewer.animator.pause(); viewer.animator.seek(t); }", time)
+        poses = page.evaluate("""() => Object.fromEntries(
+          viewer.scene_tree.find(["selfmotion", "robot"]).object.children.map((node) => {
+            node.updateMatrix();
+            return [node.name, node.matrix.toArray()];
+          }))""")
+        found = {name: np.reshape(matrix, (4, 4)).T for name, matrix in poses.items()}
+        assert largest_difference(found, plan, time) < 1e-4
+        assert largest_difference(found, plan, 0.9 * time) > 1e-3
+    assert page.locator(".dg.main .close-button").first.is_visible(), "its own controls"
+    assert_quiet(page)
+    with pytest.raises(ProblemError, match="expected a Plan"):
+        write_meshcat([plan], tmp_path / "several.html")
 
 
 def test_a_telephone_shows_it_whole(open_page, files):
@@ -509,7 +534,7 @@ def test_the_policy_stops_foreign_code(open_page, files, tmp_path):
 TIP = """() => {
   viewer.scene.updateMatrixWorld(true);
   const inverse = viewer.scene.matrixWorld.clone().invert();
-  const { object } = viewer.scene_tree.find(["selfmotion", "robot", "panda_joint7"]);
+  const object = viewer.find(`/selfmotion/robot/panda_joint7`);
   return inverse.multiply(object.matrixWorld).toArray();
 }"""
 # Between the times at which self-motions are known the tool is off by this at most [m, rad].
@@ -543,7 +568,7 @@ def test_two_plans_move_side_by_side_on_one_clock(open_page, files):
       viewer.scene.updateMatrixWorld(true);
       const inverse = viewer.scene.matrixWorld.clone().invert();
       return [number, stage.content.movers.map((name) => inverse.clone().multiply(
-        viewer.scene_tree.find(["selfmotion", "robot", name]).object.matrixWorld).toArray())];
+        viewer.find(`/selfmotion/robot/${name}`).matrixWorld).toArray())];
     })""")
     for (number, shown), plan in zip(places, (planar_plan(), planar_plan(mu=30.0)), strict=True):
         poses = [np.reshape(matrix, (4, 4)).T for matrix in shown]
@@ -575,7 +600,7 @@ def test_the_address_leads_to_a_time_and_a_plan(open_page, files):
 
 def test_bodies_frames_and_names_are_shown_when_asked_for(pages):
     page = pages["panda"]
-    shown = """() => viewer.scene_tree.find(["selfmotion", "bodies"]).object.visible"""
+    shown = """() => viewer.find(`/selfmotion/bodies`).visible"""
     assert not page.evaluate(shown)
     for key in ("b", "n", "f"):
         page.keyboard.press(key)
@@ -587,8 +612,8 @@ def test_bodies_frames_and_names_are_shown_when_asked_for(pages):
     page.evaluate("replay.seek(2.0)")
     apart = page.evaluate("""() => {
       viewer.scene.updateMatrixWorld(true);
-      const node = (part) => viewer.scene_tree.find(["selfmotion", part, "panda_joint5"]);
-      const at = (part) => node(part).object.matrixWorld.toArray();
+      const node = (part) => viewer.find(`/selfmotion/${part}/panda_joint5`);
+      const at = (part) => node(part).matrixWorld.toArray();
       const [one, other] = [at("robot"), at("bodies")];
       return Math.max(...one.map((value, k) => Math.abs(value - other[k])));
     }""")

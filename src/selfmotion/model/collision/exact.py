@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, RobotError
+from selfmotion.basics import Array, CollisionError, RobotError
 from selfmotion.model.collision import bodies as of_bodies
 from selfmotion.model.collision.bodies import Body, obstacle_bodies
 from selfmotion.model.collision.distances import HullDistances, Ints
@@ -317,6 +317,27 @@ class CollisionModel:
             `q` is not a configuration of the arm.
         """
         return self.worst(self.robot.configuration(q)[None])
+
+    def nearest_points(self, q: npt.ArrayLike, first: str, second: str) -> Array:
+        """Return the nearest points of two bodies that are a pair, in world axes, (2, 3) [m].
+
+        Of bodies of several pieces those of the nearest ones. Where bodies overlap, points of it.
+
+        Raises
+        ------
+        RobotError
+            `q` is not a configuration of the arm.
+        CollisionError
+            The two are no pair.
+        """
+        at = self.robot.configuration(q)
+        numbers = [k for k, pair in enumerate(self.pairs) if pair == (first, second)]
+        if not numbers:
+            raise CollisionError(
+                f"'{first}' and '{second}' are no pair that is checked; see `pairs`"
+            )
+        found = [self._near.points(at, pair) for pair in numbers]
+        return min(found, key=lambda points: float(np.linalg.norm(points[1] - points[0])))
 
     def worst(self, q_samples: npt.ArrayLike) -> Closest:
         """Return the smallest distance over a motion (K, n); its `index` is the row.

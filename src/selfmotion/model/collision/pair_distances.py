@@ -95,6 +95,12 @@ class MeshDistances:
             result.min_distance = beyond
         return float(coal.distance(*self._placed(places, pair), self._request, result))
 
+    def points(self, places: Any, pair: int) -> Array:
+        """Return the two nearest points of the surfaces of a pair, in world axes, (2, 3) [m]."""
+        result = coal.DistanceResult()
+        coal.distance(*self._placed(places, pair), self._request, result)
+        return np.array([result.getNearestPoint1(), result.getNearestPoint2()])
+
     def _placed(self, places: Any, pair: int) -> tuple[Any, Any, Any, Any]:
         """Return geometry and placement of both bodies, as coal takes them."""
         first, second = (
@@ -164,6 +170,10 @@ class PairDistances:
             if value < best[0]:
                 best = value, pair
         return best
+
+    def points(self, q: Array, pair: int) -> Array:
+        """Return the two nearest points of a pair at q (n,), in world axes, (2, 3) [m]."""
+        return self.meshes.points(self.hulls.place(q), pair)
 
     def distances(self, q: Array, within: Array, exact_below: Array) -> Array:
         """Return the distances at samples (K, n), (K, P); see `CollisionModel.distances`."""

@@ -6,6 +6,7 @@ from selfmotion.shell.cli import (
     jobs as jobs,
     margins as margins,
     runs as runs,
+    viewing as viewing,
 )
 from selfmotion.shell.cli.app import app as app, main as main
 

@@ -295,6 +295,10 @@ def replay(
         float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
     ] = None,
     gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
+    meshcat: Annotated[
+        Path | None,
+        typer.Option(help="Also write a page of meshcat's own viewer, of the first plan."),
+    ] = None,
     redundancy: Annotated[
         Path | None,
         typer.Option("--map", help="Also write a plan's redundancy map: .png, or .npz with all."),
@@ -304,7 +308,13 @@ def replay(
 
     Pictures of the scene need a browser (chromium) on this machine.
     """
-    from selfmotion.shell.replay import check_pictures, render_gif, render_png, write_replay
+    from selfmotion.shell.replay import (
+        check_pictures,
+        render_gif,
+        render_png,
+        write_meshcat,
+        write_replay,
+    )
 
     if png is not None or gif is not None:
         check_pictures()
@@ -326,6 +336,8 @@ def replay(
     if gif is not None:
         with StageDisplay(stages) as display:
             written.append(render_gif(first, gif, progress=display.stage))
+    if meshcat is not None:
+        written.append(write_meshcat(first, meshcat))
     if redundancy is not None:
         shown = first.redundancy_map()
         write = shown.save_png if redundancy.suffix == ".png" else shown.save

@@ -5,6 +5,10 @@ from selfmotion.shell.replay.browser import (
     render_gif as render_gif,
     render_png as render_png,
 )
+from selfmotion.shell.replay.meshcat_page import (
+    meshcat_html as meshcat_html,
+    write_meshcat as write_meshcat,
+)
 from selfmotion.shell.replay.page import (
     notebook_html as notebook_html,
     replay_html as replay_html,

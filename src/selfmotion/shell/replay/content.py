@@ -8,6 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.result import Plan
+from selfmotion.problem.constraints import Clearance
 from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
@@ -43,17 +44,23 @@ _THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 _FRAME_LENGTH = 0.12
+# What stands around is in the first view unless it is so much larger than arm and path, as a floor.
+_PART = 2.0
+# Points of the curves of a brief page.
+_FEW = 101
 
 
 class _Tip:
     """What follows a path, sampled: where it is and was to be, where the path is carried."""
 
-    def __init__(self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None) -> None:
+    def __init__(
+        self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None, few: dict[str, int]
+    ) -> None:
         self.carrier = follow.chain.carrier
-        points = {} if whole is None else {"points": whole.points}
+        points = few if whole is None else {"points": whole.points}
         self.shown = curves(plan, plan.trajectory, follow, **points)
         still = plan.initial_trajectory is plan.trajectory
-        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow)
+        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow, **few)
         # The whole path, also where the motion ends before it.
         times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
         base = follow.chain.base_placement
@@ -70,18 +77,25 @@ class _Tip:
 class _Motion:
     """A plan, sampled: the motion itself and the minimum-norm motion."""
 
-    def __init__(self, plan: Plan, whole: Whole | None) -> None:
+    def __init__(
+        self, plan: Plan, whole: Whole | None, *, brief: bool = False, with_map: bool = True
+    ) -> None:
         robot = plan.robot
         self.plan, self.whole = plan, whole
+        self.with_map = with_map and whole is None
         self.frames = key_frames(robot, plan.trajectory)
-        self.ghost = key_frames(robot, plan.initial_trajectory)
-        self.tips = [_Tip(plan, item, whole) for item in plan.problem.follows.items]
+        still = plan.initial_trajectory is plan.trajectory
+        self.ghost = self.frames if still else key_frames(robot, plan.initial_trajectory)
+        few = {"points": _FEW} if brief else {}
+        self.tips = [_Tip(plan, item, whole, few) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
         self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
-        self.clearance = None if grows else clearance_curve(plan.trajectory, models)
-        self.self_motion = None if whole else self_motion(plan.problem, plan.trajectory)
+        # How far apart bodies have to be [m].
+        self.asked = max((item.distance for item in _clearances(plan)), default=0.0)
+        self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
+        self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
 
 
 def page_content(
@@ -91,14 +105,15 @@ def page_content(
     *,
     triads: int | npt.ArrayLike,
     whole: Whole | None = None,
+    with_map: bool = True,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
 
-    `whole` is what the one plan stands for, where it does.
+    `whole` is what the one plan stands for, where it does; maps take seconds, and may be left out.
     """
     robot = plans[0].robot
     arm = links.bake(robot, payload)
-    motions = [_Motion(plan, whole) for plan in plans]
+    motions = [_Motion(plan, whole, with_map=with_map) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -107,11 +122,14 @@ def page_content(
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
     # A part is seen whole, a floor is not.
     around = [
-        corners for motion in motions for corners in scene.outlines(motion.obstacles, box.radius)
+        corners
+        for motion in motions
+        for corners in scene.outlines(motion.obstacles, _PART * box.radius)
     ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
+        "radius": box.radius,
         "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),
@@ -136,6 +154,37 @@ def page_content(
         ],
         "table": [*_missing(arm, len(plans)), *_facts(plans, whole)],
     }
+
+
+def plan_content(
+    plan: Plan,
+    name: str,
+    payload: Payload,
+    *,
+    radius: float,
+    triads: int,
+    whole: Whole | None = None,
+    brief: bool = False,
+) -> Json:
+    """Return what of a page is another with another plan, in a scene of that radius [m].
+
+    Without the redundancy map; a `brief` one also without distances and self-motions.
+    """
+    motion = _Motion(plan, whole, brief=brief, with_map=False)
+    scale = _scale([motion])
+    root = "/selfmotion/plan0"
+    longest = float(np.linalg.norm(motion.shown.ellipsoid, axis=(1, 2)).max())
+    return {
+        "scale": {**scale, "colors": three.COLOR_SCALE},
+        "ellipsoidSize": _ELLIPSOID_LENGTH * radius / longest,
+        "joints": _joints(plan),
+        "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
+        "table": _facts([plan], whole),
+    }
+
+
+def _clearances(plan: Plan) -> list[Clearance]:
+    return [item for item in plan.problem.all_constraints if isinstance(item, Clearance)]
 
 
 def _layers(motions: list[_Motion]) -> list[Json]:
@@ -180,7 +229,7 @@ def _plan(
     size: float,
 ) -> Json:
     """Return what a page needs of one plan, its traces below the node `root`."""
-    shown, whole = motion.shown, motion.whole
+    plan, shown, whole = motion.plan, motion.shown, motion.whole
     times = (
         np.linspace(0.0, shown.t[-1], triads)
         if isinstance(triads, int)
@@ -205,7 +254,7 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
-        "redundancy": None if whole else packed_map(map_of(motion.plan), payload),
+        "redundancy": packed_map(map_of(plan), payload) if motion.with_map else None,
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {
@@ -213,7 +262,9 @@ def _plan(
             "matrix": payload.array(shown.ellipsoid),
             "tool": payload.array(shown.tool_in_world),
         },
-        "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "clearance": None
+        if motion.clearance is None
+        else _clearance(motion.clearance, payload) | {"asked": motion.asked},
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [
@@ -293,6 +344,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
         "t": payload.array(curve.t),
         "value": payload.array(curve.value),
         "pairs": curve.pairs,
+        "points": payload.array(curve.points),
     }
 
 

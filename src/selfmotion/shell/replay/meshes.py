@@ -273,6 +273,11 @@ class Payload:
 
     def pack(self, content: Json) -> str:
         """Return `content` and all arrays as base64 text, the same for the same input."""
+        data = gzip.compress(self.data(content), compresslevel=6, mtime=0)
+        return base64.b64encode(data).decode("ascii")
+
+    def data(self, content: Json) -> bytes:
+        """Return `content` and all arrays as bytes: see the layout above."""
         layout, chunks, offset = [], [], 0
         for array in self._arrays:
             layout.append([_TYPES[array.dtype.str[1:]], offset, array.size])
@@ -284,8 +289,7 @@ class Payload:
             allow_nan=False,
             separators=(",", ":"),
         ).encode()
-        data = _padded(struct.pack("<I", len(text)) + text) + b"".join(chunks)
-        return base64.b64encode(gzip.compress(data, compresslevel=6, mtime=0)).decode("ascii")
+        return _padded(struct.pack("<I", len(text)) + text) + b"".join(chunks)
 
 
 def grid_codes(grid: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:

@@ -253,11 +253,14 @@ class ClearanceCurve:
         Smallest distance over all pairs of bodies [m].
     pairs : tuple of (str, str)
         The pair at each time.
+    points : (K, 2, 3)
+        Where the two are nearest, in world axes [m].
     """
 
     t: Array
     value: Array
     pairs: tuple[tuple[str, str], ...]
+    points: Array
 
 
 def clearance_curve(
@@ -269,14 +272,18 @@ def clearance_curve(
         return None
     times = np.linspace(0.0, trajectory.duration, _POINTS)
     clock = np.minimum(trajectory.t[0] + times, trajectory.t[-1])
-    found = [
-        min((model.distance(q) for model in watched), key=lambda closest: closest.value)
-        for q in trajectory(clock)
-    ]
+    found, points = [], []
+    for q in trajectory(clock):
+        closest, model = min(
+            ((model.distance(q), model) for model in watched), key=lambda item: item[0].value
+        )
+        found.append(closest)
+        points.append(model.nearest_points(q, closest.first, closest.second))
     return ClearanceCurve(
         times,
         np.array([each.value for each in found]),
         tuple((each.first, each.second) for each in found),
+        np.array(points),
     )
 
 

@@ -6,7 +6,6 @@ import base64
 import gzip
 import hashlib
 import html
-import importlib.metadata
 import os
 from collections.abc import Sequence
 from importlib import resources
@@ -36,8 +35,10 @@ from selfmotion.work.job import Program
 # What a page can show.
 Shown = Plan | Sequence[Plan] | Program | Parts | Move
 _TRIADS, _MOST_TRIADS = 7, 1000
-_VIEWER = "meshcat/viewer/dist/main.min.js"
-_SCRIPTS = ("payload.js", "stage.js", "plots.js", "map.js", "page.js")
+# three.js, as `make three` takes it from its own package; the page's own scripts.
+_THREE = "three/three.min.js"
+_LIVE = ("handles.js", "live.js")
+_SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "tools.js", "page.js")
 
 
 def replay_html(
@@ -101,6 +102,19 @@ def replay_html(
     return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
 
 
+def live_html(plan: Plan, *, title: str) -> tuple[str, float]:
+    """Return the page of a plan that is changed while it is shown, and the scene's radius [m].
+
+    It is that of `replay_html` with the modules that a server is asked by: see `shell.view`.
+    """
+    payload = Payload()
+    content = page_content([plan], ["plan"], payload, triads=_TRIADS, with_map=False)
+    picture = still(plan.robot, plan.trajectory, plan.obstacles, content["camera"], [])
+    live = payload.pack({**content, "live": True})
+    page = _assemble(title, describe(plan), live, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))
+    return page, float(content["radius"])
+
+
 def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
@@ -161,43 +175,64 @@ def _checked(triads: int | npt.ArrayLike) -> int | Array:
     return np.atleast_1d(as_numbers(triads, "triads", "how many, or times [s]"))
 
 
-def _assemble(title: str, description: str, payload: str, picture: str) -> str:
-    viewer = _viewer_code()
-    script = "\n" + "\n".join(_web(name) for name in _SCRIPTS)
-    policy = "; ".join(
-        [
-            "default-src 'none'",
-            f"script-src {_hash(script)} {_hash(viewer)}",
-            # meshcat and its control panel put style sheets of their own into the page.
-            "style-src 'unsafe-inline'",
-            "img-src data: blob:",
-            "base-uri 'none'",
-            "form-action 'none'",
-        ]
-    )
-    packed = base64.b64encode(gzip.compress(viewer.encode(), compresslevel=9, mtime=0))
-    return Template(_web("page.html")).substitute(
-        policy=policy,
+def _assemble(
+    title: str,
+    description: str,
+    payload: str,
+    picture: str,
+    scripts: Sequence[str] = _SCRIPTS,
+) -> str:
+    code, script = web(_THREE), joined(scripts)
+    live = scripts is not _SCRIPTS
+    return Template(web("page.html")).substitute(
+        policy=policy(script, code, live=live),
         title=html.escape(title),
         description=html.escape(description),
-        style=_web("style.css"),
-        viewer=packed.decode("ascii"),
+        style=web("style.css"),
+        viewer=squeezed(code),
         payload=payload,
         still=picture,
         script=script,
     )
 
 
-def _viewer_code() -> str:
-    """Return meshcat's viewer. `import meshcat` would bring ZeroMQ; this only reads its file."""
-    file = importlib.metadata.distribution("meshcat").locate_file(_VIEWER)
-    return Path(str(file)).read_text(encoding="utf-8")
+# What pages are made of, here and for meshcat.
 
 
-def _web(name: str) -> str:
-    return (
-        resources.files("selfmotion.shell.replay").joinpath("web", name).read_text(encoding="utf-8")
+def joined(names: Sequence[str]) -> str:
+    """Return scripts of the page as one."""
+    return "\n" + "\n".join(web(name) for name in names)
+
+
+def policy(*scripts: str, live: bool = False) -> str:
+    """Return what a page may load and run: these scripts, and nothing from outside.
+
+    One that is `live` may ask the server that it came from.
+    """
+    return "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src {' '.join(map(_hash, scripts))}",
+            # What moves is placed by its own style.
+            "style-src 'unsafe-inline'",
+            "img-src data: blob:",
+            *(["connect-src 'self'"] if live else []),
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
     )
+
+
+def squeezed(code: str) -> str:
+    """Return a script as the page holds it, until it is run."""
+    packed = base64.b64encode(gzip.compress(code.encode(), compresslevel=9, mtime=0))
+    return packed.decode("ascii")
+
+
+def web(name: str) -> str:
+    """Return a file of the page by its name."""
+    file = resources.files("selfmotion.shell.replay").joinpath("web", *name.split("/"))
+    return file.read_text(encoding="utf-8")
 
 
 def _hash(script: str) -> str:

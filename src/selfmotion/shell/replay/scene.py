@@ -93,15 +93,13 @@ def camera(hull: Array, tool: Array) -> Json:
 
 
 def stage_commands(box: Extent) -> list[Json]:
-    """Return the commands for light, shadow and a ground grid, in place of meshcat's own."""
+    """Return the commands for light, shadow and a ground grid."""
     center, reach = box.center, max(box.radius, 0.1)
     far = float(np.linalg.norm(center)) + 4.0 * reach
     half = float(np.linalg.norm(center)) + 1.2 * reach
     ground = np.eye(4)
     ground[:3, 3] = [center[0], center[1], box.low[2] - 0.002 * reach]
     return [
-        *(three.delete(path) for path in ("/Lights", "/Grid", "/Axes")),
-        {"type": "set_property", "path": "/Background", "property": "visible", "value": False},
         three.set_light(
             f"{_ROOT}/stage/sky",
             np.array([0.0, 0.0, 1.0]),

@@ -35,6 +35,9 @@ _ALIKE = 5e-4
 def facts(plan: Plan) -> dict[str, Cell]:
     """Return what a reader wants to know of a plan: label → number and remark."""
     report, certificate = plan.report, plan.certificate
+    if not certificate.findings:
+        # An arm that stands, for a page without a motion.
+        return {"verdict": (certificate.verdict, "")}
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
     rows["cost"] = _compared(report.cost, report.initial_cost)
     if report.remaining is not None and certificate.verified:
@@ -93,6 +96,9 @@ def table(plans: list[Plan]) -> list[dict[str, Any]]:
 def describe(plan: Plan) -> str:
     """Return one sentence that tells a stranger what the page shows."""
     report = plan.report
+    if not plan.certificate.findings:
+        # There is no motion to describe.
+        return plan.certificate.verdict
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0

@@ -24,13 +24,17 @@ class Page {
     this.makeLayers();
     this.makeTable();
     this.connect();
+    this.jog = new Jog(this);
+    get("jog").hidden = get("measure").hidden = !stage;
+    if (stage) this.measure = new Measure(stage);
     stage?.onRender((time) => this.follow(time));
     const asked = new URLSearchParams(location.hash.slice(1));
     const plan = Number(asked.get("plan") ?? 1) - 1;
     this.choose(this.content.plans[plan] ? plan : 0);
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     if (asked.has("t")) this.seek(Number(asked.get("t")) || 0);
-    else if (stage && !still) this.play();
+    else if (stage && !still && !content.live) this.play();
+    if (content.live) this.live = new Live(this);
   }
 
   // The stages that are shown, each with the number of its plan.
@@ -42,7 +46,27 @@ class Page {
 
   get duration() { return this.plan.duration; }
 
-  choose(number) {
+  // Show another plan in place of the first; what of it takes long to draw may come later.
+  replace({ number, brief, plans: [plan], scale, table, ellipsoidSize, tree, arm, joints, stopped = [] }) {
+    Object.assign(this.content, { plans: [plan], scale, ellipsoidSize, joints }, tree ? { tree } : {});
+    if (this.stage) {
+      if (arm) this.stage.redraw(arm);
+      this.stage.replace(plan);
+      for (const command of stopped) this.stage.viewer.run(command, this.stage.meshes);
+    }
+    if (!brief) {
+      this.content.table = table;
+      this.makeTable();
+      this.makeLegend();
+    }
+    // What is told later of the same plan leaves the arm where it was put by hand.
+    const stood = this.standing && number === this.told ? this.stood : null;
+    this.told = number;
+    this.choose(0, brief);
+    if (stood) this.stand(...stood);
+  }
+
+  choose(number, brief = false) {
     this.plan = this.content.plans[number];
     this.number = number;
     get("time").max = this.duration;
@@ -66,9 +90,11 @@ class Page {
       get("selfmotion").title = `Moves the arm where it stops, while its tool stays: turns ${selfMotion.joint}`;
     }
     this.applyLayers();
-    this.makePlots();
-    this.makeSteps();
-    this.makeMarks();
+    if (!brief) {
+      this.makePlots();
+      this.makeSteps();
+      this.makeMarks();
+    }
     this.seek(Math.min(this.now, this.duration));
   }
 
@@ -86,7 +112,7 @@ class Page {
 
   // The address leads to the time and the plan that are shown.
   link() {
-    if (!location.protocol.startsWith("http") && location.protocol !== "file:") return;
+    if (this.content.live || (!location.protocol.startsWith("http") && location.protocol !== "file:")) return;
     const plan = this.content.plans.length > 1 ? `&plan=${this.number + 1}` : "";
     history.replaceState(null, "", `#t=${this.now.toFixed(3)}${plan}`);
   }
@@ -107,6 +133,7 @@ class Page {
     this.showPair(time);
     this.showStep(time);
     this.showLast(time);
+    if (!this.standing) this.jog?.show();
     for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], time);
   }
 
@@ -128,6 +155,7 @@ class Page {
     get("pair").hidden = !shown;
     if (!shown) {
       this.stage?.mark([], {});
+      this.stage?.connect();
       return;
     }
     const last = clearance.t.length - 1;
@@ -137,7 +165,11 @@ class Page {
     get("pair").classList.toggle("meet", apart <= 0);
     get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(1e3 * apart)} mm`
       : `${first} and ${second} meet`;
-    this.stage?.mark([first, second], this.plan.obstacles, apart <= 0);
+    // Coloured only where it matters: where they meet, or are nearer than twice what was asked.
+    const near = apart < 2 * clearance.asked;
+    this.stage?.mark(apart <= 0 || near ? [first, second] : [], this.plan.obstacles, apart <= 0);
+    const ends = [0, 3].map((from) => Array.from(clearance.points.subarray(6 * k + from, 6 * k + from + 3)));
+    this.stage?.connect(ends, `${format(1e3 * apart)} mm`, near || apart <= 0);
   }
 
   play() {
@@ -221,6 +253,7 @@ class Page {
     // Of these postures nobody has measured it.
     get("pair").hidden = true;
     this.stage?.mark([], {});
+    this.stage?.connect();
     for (const [stage, k] of this.sides) {
       const { selfMotion } = this.content.plans[k];
       if (selfMotion) stage.place(this.content.plans[k], this.now, step + (selfMotion.steps - 1) / 2);
@@ -229,12 +262,15 @@ class Page {
   }
 
   // Stand in a configuration that the map has, with the bodies marked that meet there.
-  stand(q, cause) {
+  stand(q, cause, said = `shown from the map: ${cause || "allowed"}`) {
     this.standing = q;
+    this.stood = [q, cause, said];
     // In the place of the closest pair: the map stays where it is under the pointer.
-    get("pair").textContent = `shown from the map: ${cause || "allowed"}`;
+    get("pair").hidden = false;
+    get("pair").textContent = said;
     get("pair").classList.toggle("meet", cause !== "");
     this.stage?.mark(cause.split(" "), this.plan.obstacles, true);
+    this.stage?.connect();
     for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], this.now);
   }
 
@@ -250,7 +286,7 @@ class Page {
           to.camera.position.copy(from.camera.position);
           to.camera.quaternion.copy(from.camera.quaternion);
           to.controls.target.copy(from.controls.target);
-          to.set_dirty();
+          to.draw();
         });
       }
     }
@@ -267,11 +303,7 @@ class Page {
     const lines = Array.from(t, (time, row) =>
       [time, ...q.subarray(row * joints.length, (row + 1) * joints.length)].join(","));
     const text = [["t", ...joints.map(({ name }) => name)].join(","), ...lines, ""].join("\n");
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-    link.download = "motion.csv";
-    link.click();
-    URL.revokeObjectURL(link.href);
+    offer(new Blob([text], { type: "text/csv" }), "motion.csv");
   }
 
   key(event) {
@@ -425,6 +457,7 @@ class Page {
   }
 
   makeTable() {
+    get("numbers").replaceChildren();
     element(get("numbers"), "h2", {}, "Report and certificate");
     const table = element(element(get("numbers"), "div", { class: "wide" }), "table");
     const head = element(element(table, "thead"), "tr");

@@ -9,7 +9,10 @@ async function inflate(base64) {
 const ARRAY_TYPES = { Uint8Array, Uint16Array, Uint32Array, Float32Array, Float64Array };
 
 async function readPayload(base64) {
-  const buffer = await inflate(base64);
+  return revivePayload(await inflate(base64));
+}
+
+function revivePayload(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const start = Math.ceil((4 + length) / 8) * 8;

@@ -1,42 +1,6 @@
-// The 3-D scene: meshcat's viewer, fed from the payload instead of a server.
+// The 3-D scene: the arm, what stands around it, and the plans' traces; the arm at any time.
 
 const ROOT = "/selfmotion";
-
-function attribute(array, itemSize, normalized = false) {
-  return { array, itemSize, normalized, type: array.constructor.name };
-}
-
-// Geometries that refer to the page's arrays become what three.js's loader expects.
-function expandGeometry(geometry, meshes) {
-  const attributes = {};
-  let index;
-  if ("mesh" in geometry) {
-    attributes.position = attribute(meshes[geometry.mesh].position, 3);
-    index = meshes[geometry.mesh].index;
-  } else if ("vertices" in geometry) {
-    attributes.position = attribute(geometry.vertices, 3);
-    if (geometry.colors) attributes.color = attribute(geometry.colors, 3, true);
-    index = geometry.triangles;
-  } else if ("lines" in geometry) {
-    attributes.position = attribute(new Float32Array(geometry.lines), 3);
-  } else {
-    return geometry;
-  }
-  const data = { attributes };
-  if (index) data.index = attribute(index, 1);
-  return { uuid: geometry.uuid, type: "BufferGeometry", data };
-}
-
-function tracks({ t, position, quaternion }, joint, joints) {
-  const keys = (array, width) => Array.from(t, (time, k) => {
-    const start = (k * joints + joint) * width;
-    return { time, value: Array.from(array.subarray(start, start + width)) };
-  });
-  return [
-    { name: ".position", type: "vector3", keys: keys(position, 3) },
-    { name: ".quaternion", type: "quaternion", keys: keys(quaternion, 4) },
-  ];
-}
 
 // Rows of tables at a time, between those at even times.
 function between(t, time) {
@@ -46,34 +10,39 @@ function between(t, time) {
     + (place - k) * (table[width * (k + 1) + i] - table[width * k + i]));
 }
 
+// Which section of a table of times has a time in it, and the share of it that is over.
+function section(t, time) {
+  let [low, high] = [0, t.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (t[middle] <= time) low = middle; else high = middle;
+  }
+  return [low, Math.min(Math.max((time - t[low]) / (t[low + 1] - t[low]), 0), 1)];
+}
+
 class Stage {
   constructor(element, content) {
     this.element = element;
     this.content = content;
-    this.viewer = new MeshCat.Viewer(element);
-    const resize = this.viewer.set_3d_pane_size.bind(this.viewer);
-    // meshcat takes the window's height; the scene is only a part of this page.
-    this.viewer.set_3d_pane_size = () => resize(element.clientWidth, element.clientHeight);
+    this.viewer = new Viewer(element);
     this.turned = false;
     this.marked = [];
-    this.kept = new Map();
+    this.time = 0;
     new ResizeObserver(() => this.resize()).observe(element);
     this.names = element.appendChild(document.createElement("div"));
     this.names.className = "names";
-    const meshes = content.meshes.map(decodeMesh);
-    for (const command of content.commands) this.run(command, meshes);
-    for (const plan of content.plans) for (const command of plan.commands) this.run(command, meshes);
+    this.apart = element.appendChild(document.createElement("div"));
+    this.apart.className = "apart";
+    this.meshes = content.meshes.map(decodeMesh);
+    for (const command of content.commands) this.viewer.run(command, this.meshes);
     this.viewer.controls.addEventListener("start", () => { this.turned = true; });
     this.ball = this.find(`${ROOT}/ellipsoid`);
     this.ball.matrixAutoUpdate = false;
-    // meshcat lets every object cast a shadow; here only what is solid does, and only one light.
-    this.find(ROOT).traverse((object) => { object.castShadow = false; });
-    const solid = content.plans.map((plan) => `${plan.root}/obstacles`);
-    for (const path of [`${ROOT}/robot`, `${ROOT}/stage/sun`, ...solid]) {
-      this.find(path).traverse((object) => { object.castShadow = true; });
-    }
+    // Only what is solid casts a shadow, of only one light.
+    for (const path of [`${ROOT}/robot`, `${ROOT}/stage/sun`]) this.castShadow(path);
+    for (const plan of content.plans) this.add(plan);
     this.axes = content.movers.map((node) => {
-      const axes = new MeshCat.THREE.AxesHelper(content.frameSize);
+      const axes = new THREE.AxesHelper(content.frameSize);
       axes.visible = false;
       // Seen through what is around it, as a frame in a link is.
       axes.material.depthTest = false;
@@ -84,73 +53,132 @@ class Stage {
     this.frame();
   }
 
-  // The page's commands stay as they are: another stage runs them, too.
-  run(command, meshes) {
-    const { object } = command;
-    const geometries = object?.geometries?.map((g) => expandGeometry(g, meshes));
-    this.viewer.handle_command(geometries ? { ...command, object: { ...object, geometries } } : command);
+  // Draw what belongs to a plan.
+  add(plan) {
+    for (const command of plan.commands) this.viewer.run(command, this.meshes);
+    this.castShadow(`${plan.root}/obstacles`);
+  }
+
+  // Draw a plan in place of another one at the same node.
+  replace(plan) {
+    this.viewer.remove(plan.root);
+    this.marked = [];
+    this.add(plan);
+  }
+
+  // Draw objects in place of those at their nodes.
+  redraw(commands) {
+    for (const { path } of commands) this.viewer.remove(path);
+    for (const command of commands) this.viewer.run(command, this.meshes);
+    this.castShadow(`${ROOT}/robot`);
+  }
+
+  // The arm without its colours, as long as it shows an older motion, or one that is not verified.
+  setGrey(grey) {
+    this.find(`${ROOT}/robot`).traverse(({ isMesh, material, userData }) => {
+      if (!isMesh || material.depthTest === false) return;
+      userData.color ??= material.color.getHex();
+      const { r, g, b } = new THREE.Color(userData.color);
+      const light = 0.25 + 0.35 * ((r + g + b) / 3);
+      if (grey) material.color.setRGB(light, light, light);
+      else material.color.setHex(userData.color);
+    });
+    this.viewer.draw();
+  }
+
+  // A line between two points with its number; without them none.
+  connect(ends, text = "", near = false) {
+    this.ends = ends;
+    this.apart.replaceChildren();
+    if (!ends) {
+      this.viewer.remove(`${ROOT}/apart`);
+      this.viewer.draw(false);
+      return;
+    }
+    const points = ends.map((point) => new THREE.Vector3(...point));
+    this.line(`${ROOT}/apart`, points, near ? 0xe8701a : 0x5b6f8f);
+    const span = document.createElement("span");
+    span.textContent = text;
+    span.classList.toggle("near", near);
+    this.apart.append(span);
+    this.follow();
+  }
+
+  // The number is where the line is, however the scene is looked at.
+  follow() {
+    const [span] = this.apart.children;
+    if (!span || !this.ends) return;
+    const [one, other] = this.ends.map((point) => new THREE.Vector3(...point));
+    this.write(span, one.lerp(other, 0.5));
+  }
+
+  // Draw a line through points, over all that is in front of it.
+  line(path, points, color) {
+    this.viewer.remove(path);
+    const geometry = new THREE.BufferGeometry().setFromPoints(points);
+    const line = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color, depthTest: false }));
+    line.renderOrder = 1;
+    this.find(path).add(line);
+    this.viewer.draw();
+  }
+
+  castShadow(path) {
+    this.find(path).traverse((object) => { object.castShadow = true; });
   }
 
   find(path) {
-    return this.viewer.scene_tree.find(path.split("/").filter(Boolean)).object;
+    return this.viewer.find(path);
   }
 
   show(path, visible) {
-    this.viewer.handle_command({ type: "set_property", path, property: "visible", value: visible });
+    this.find(path).visible = visible;
+    this.viewer.draw();
   }
 
-  // The plan's links and its ghost's move with meshcat's own animation, last of all commands.
+  // From now on the links move as a plan says, their ghosts as its minimum-norm motion does.
   load(plan) {
-    this.back();
-    const clips = [];
     const { movers } = this.content;
-    const add = (root, frames) => movers.forEach((node, k) => clips.push({
-      path: `${root}/${node}`,
-      clip: { fps: 1, name: node, tracks: tracks(frames, k, movers.length) },
-    }));
+    const tree = (root, frames) => movers.map((node, joint) => [this.find(`${root}/${node}`), frames, joint]);
     // What rides on a part moves as the joint that carries it.
     const riders = [...plan.tips.filter((tip) => tip.carrier >= 0), ...plan.riders];
-    for (const { root, carrier } of riders) {
-      clips.push({ path: root, clip: {
-        fps: 1, name: root, tracks: tracks(plan.frames, carrier, movers.length) } });
-    }
-    add(`${ROOT}/robot`, plan.frames);
-    add(`${ROOT}/ghost`, plan.ghost);
-    if (this.content.layers.some(({ name }) => name === "bodies")) add(`${ROOT}/bodies`, plan.frames);
-    this.viewer.handle_command({
-      type: "set_animation", animations: clips, options: { play: true, repetitions: 1 } });
-    this.viewer.animator.pause();
+    this.moved = [
+      ...riders.map(({ root, carrier }) => [this.find(root), plan.frames, carrier]),
+      ...tree(`${ROOT}/robot`, plan.frames),
+      ...tree(`${ROOT}/ghost`, plan.ghost),
+      ...tree(`${ROOT}/bodies`, plan.frames),
+    ];
   }
 
-  // Everything that moves follows the animator's time just before a frame is drawn.
+  // Something is done just before each picture, where whatever it shows may be brought up to date.
   onRender(callback) {
-    const render = this.viewer.render.bind(this.viewer);
-    this.viewer.render = () => {
+    this.viewer.before = () => {
       callback(this.time);
-      render();
+      this.follow();
     };
   }
 
-  get time() {
-    const actions = this.viewer.animator.actions;
-    return actions.length ? Math.max(...actions.map((action) => action.time)) : 0;
-  }
-
   seek(time) {
-    this.back();
-    this.viewer.animator.seek(time);
-    this.viewer.animator.display_progress(time);
+    this.time = time;
+    const { length } = this.content.movers;
+    const [from, to] = [new THREE.Quaternion(), new THREE.Quaternion()];
+    for (const [object, { t, position, quaternion }, joint] of this.moved) {
+      const [k, share] = section(t, time);
+      const [here, there] = [k * length + joint, (k + 1) * length + joint];
+      object.position.fromArray(position, 3 * here).lerp(
+        new THREE.Vector3().fromArray(position, 3 * there), share);
+      object.quaternion.copy(from.fromArray(quaternion, 4 * here)).slerp(to.fromArray(quaternion, 4 * there), share);
+    }
+    this.viewer.draw();
   }
 
-  // Where the tool is, in meshcat's axes with y up.
+  // Where the tool is.
   toolAt({ tool, t }, time) {
-    const [x, y, z] = between(t, time)(tool, 3);
-    return new MeshCat.THREE.Vector3(x, z, -y);
+    return new THREE.Vector3(...between(t, time)(tool, 3));
   }
 
   // Go along with a point; the first one only tells where it is.
   accompany(point) {
-    if (point && this.seen) {
+    if (point && this.seen && !point.equals(this.seen)) {
       const way = point.clone().sub(this.seen);
       this.viewer.camera.position.add(way);
       this.viewer.controls.target.add(way);
@@ -161,7 +189,6 @@ class Stage {
 
   // Put the links where a self-motion has them: tables of poses by step, time and joint.
   place(plan, time, step) {
-    const { THREE } = MeshCat;
     const { t, position, quaternion, steps } = plan.selfMotion;
     const { movers } = this.content;
     const at = (value, count) => {
@@ -183,15 +210,14 @@ class Stage {
       turn.normalize();
       this.put(plan, node, joint, place, turn);
     });
-    this.viewer.set_dirty();
+    this.viewer.draw();
   }
 
-  // Put what moves with a joint somewhere else than the animation has it.
+  // Put what moves with a joint somewhere else than the plan has it, until the next time.
   put(plan, node, joint, place, turn) {
     const moved = [`${ROOT}/robot/${node}`, `${ROOT}/bodies/${node}`,
       ...plan.riders.filter(({ carrier }) => carrier === joint).map(({ root }) => root)];
     for (const object of moved.map((path) => this.find(path))) {
-      if (!this.kept.has(object)) this.kept.set(object, [object.position.clone(), object.quaternion.clone()]);
       object.position.copy(place);
       object.quaternion.set(turn.x, turn.y, turn.z, turn.w);
     }
@@ -199,7 +225,6 @@ class Stage {
 
   // Put the links where a configuration has them: each joint is placed in the one before.
   stand(plan, q) {
-    const { THREE } = MeshCat;
     const { coordinates, parents, rotations, positions, axes, revolute, scales } = this.content.tree;
     const frames = [new THREE.Matrix4()];
     this.content.movers.forEach((node, joint) => {
@@ -215,32 +240,25 @@ class Stage {
       const turn = new THREE.Quaternion().setFromRotationMatrix(frames[joint + 1]);
       this.put(plan, node, joint, place, turn);
     });
-    this.viewer.set_dirty();
+    this.viewer.draw();
   }
 
-  // Put the links back: the animator writes nothing that it holds to be where it put it.
-  back() {
-    for (const [object, [place, turn]] of this.kept) {
-      object.position.copy(place);
-      object.quaternion.copy(turn);
-    }
-    this.kept.clear();
+  // Put a text where a point is seen; false where it is behind the eye.
+  write(text, point) {
+    const { x, y, z } = point.clone().project(this.viewer.camera);
+    const wide = this.element.clientWidth, high = this.element.clientHeight;
+    text.style.transform = `translate(${(0.5 + x / 2) * wide}px, ${(0.5 - y / 2) * high}px) translate(-50%, -50%)`;
+    return z <= 1;
   }
 
   // Write the names of bodies where they are.
   label(paths) {
-    const { THREE } = MeshCat;
-    const { camera } = this.viewer;
-    const wide = this.element.clientWidth, high = this.element.clientHeight;
     this.names.replaceChildren(...Object.entries(paths).flatMap(([name, path]) => {
       const box = new THREE.Box3().setFromObject(this.find(path));
       if (box.isEmpty()) return [];
-      const seen = box.getCenter(new THREE.Vector3()).project(camera);
-      if (seen.z > 1) return [];
       const text = document.createElement("span");
       text.textContent = name;
-      text.style.transform = `translate(${(0.5 + seen.x / 2) * wide}px, ${(0.5 - seen.y / 2) * high}px) translate(-50%, -50%)`;
-      return [text];
+      return this.write(text, box.getCenter(new THREE.Vector3())) ? [text] : [];
     }));
   }
 
@@ -269,25 +287,22 @@ class Stage {
   }
 
   resize() {
-    this.viewer.set_3d_pane_size();
+    this.viewer.resize();
     if (!this.turned) this.frame();
   }
 
   // Stand just far enough away that the moving arm and its path fill the window.
   frame(direction = this.content.camera.direction) {
-    const { THREE } = MeshCat;
     const { points } = this.content.camera;
     this.seen = undefined;
-    // meshcat's camera lives in axes with y up.
-    const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
-    const toEye = upright(direction);
-    const right = new THREE.Vector3(0, 1, 0).cross(toEye).normalize();
+    const vector = (xyz) => new THREE.Vector3(...xyz);
+    const toEye = vector(direction);
+    const right = new THREE.Vector3(0, 0, 1).cross(toEye).normalize();
     const up = toEye.clone().cross(right);
     const camera = this.viewer.camera;
-    camera.fov = 36;
     const aspect = Math.max(this.element.clientWidth, 1) / Math.max(this.element.clientHeight, 1);
     const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2));
-    const seen = points.map(upright).map((p) => [p.dot(right), p.dot(up), p.dot(toEye)]);
+    const seen = points.map(vector).map((p) => [p.dot(right), p.dot(up), p.dot(toEye)]);
     // Along each of the picture's axes two lines through the eye bound the scene, with slopes that
     // leave a margin: more at the top, where the verdict stands. An eye at depth d sees all points
     // if its coordinate lies between `high - upper * d` and `low + lower * d`.
@@ -306,9 +321,10 @@ class Stage {
     camera.position.copy(target).addScaledVector(toEye, distance);
     camera.near = distance / 200;
     camera.far = distance * 20;
+    camera.updateProjectionMatrix();
     this.viewer.controls.target.copy(target);
     this.viewer.controls.update();
     this.turned = false;
-    this.viewer.set_dirty();
+    this.viewer.draw();
   }
 }

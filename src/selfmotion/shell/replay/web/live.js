@@ -1,0 +1,232 @@
+// The page while its problem is changed: what is asked of the server, and what it tells.
+
+const TOLD = ["cost", "limits used fully", "margin to a joint limit, least", "speed, most", "duration"];
+// How the server ends a connection: without the token, and where another tab has the page.
+const REFUSED = 4403;
+const TAKEN = 4409;
+// A slider has so many steps.
+const STEPS = 400;
+
+class Live {
+  constructor(page) {
+    this.page = page;
+    this.token = new URLSearchParams(location.search).get("token") ?? "";
+    this.sliders = new Map();
+    // What was asked is counted; what is shown answers one of these.
+    this.asked = this.answered = 0;
+    document.documentElement.classList.add("live");
+    get("change").hidden = false;
+    if (page.stage) {
+      this.handles = new Handles(page.stage, page.content.radius,
+        (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
+    }
+    get("undo").addEventListener("click", () => this.ask({ do: "undo" }));
+    get("save").addEventListener("click", () => this.ask({ do: "save" }));
+    get("export").addEventListener("change", () => this.export());
+    get("turns").addEventListener("click", () => this.handles?.setTurns(!this.handles.turns) ?? this.drawTurns());
+    get("letgo").addEventListener("click", () => this.handles?.choose(undefined));
+    window.addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
+    this.connect();
+  }
+
+  connect() {
+    this.socket = new WebSocket(`ws://${location.host}/live?token=${encodeURIComponent(this.token)}`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.addEventListener("message", ({ data }) => {
+      if (typeof data === "string") this.hear(JSON.parse(data));
+      else this.take(revivePayload(data));
+    });
+    this.socket.addEventListener("close", ({ code, reason }) => this.end(code, reason));
+  }
+
+  end(code, reason) {
+    const said = code === TAKEN ? "Another tab has this page: close it there, then load this one again."
+      : code === REFUSED ? `Refused: ${reason}.`
+        : "The server has ended. Run selfmotion view again; what was not saved is lost.";
+    this.say(said, true);
+    this.changed = false;
+    get("change").inert = true;
+    this.handles?.choose(undefined);
+    document.documentElement.dataset.live = code === TAKEN ? "taken" : "ended";
+  }
+
+  ask(asked) {
+    if (this.socket.readyState !== WebSocket.OPEN) return;
+    this.say("");
+    if (asked.do !== "save") {
+      this.asked += 1;
+      this.wait();
+    }
+    this.socket.send(JSON.stringify({ ...asked, mark: this.asked }));
+  }
+
+  say(text, bad = false) {
+    get("told").textContent = text;
+    get("told").classList.toggle("bad", bad);
+  }
+
+  // What is shown is the older plan, until another one comes.
+  wait() {
+    document.documentElement.dataset.live = "waiting";
+    get("verdict").className = "coarse";
+    this.page.stage?.setGrey(true);
+  }
+
+  // A short answer: what cannot be done, or that it is saved.
+  hear(answer) {
+    if (answer.error) {
+      this.say(answer.error, true);
+      // Nothing was changed: what is shown is still right.
+      this.asked = this.answered;
+      if (this.last) this.judge(this.last);
+      return;
+    }
+    if (answer.saved) this.say("Saved.");
+    this.state(answer);
+  }
+
+  state({ sliders, changed, undo }) {
+    this.changed = changed;
+    get("save").disabled = !changed;
+    get("undo").disabled = !undo;
+    this.drawSliders(sliders);
+  }
+
+  // A plan, or a first motion, or what stops it.
+  take(message) {
+    const { page } = this;
+    const { kind, brief, plans, handles } = message;
+    const coarse = kind === "coarse";
+    this.answered = message.answers;
+    this.state(message);
+    if (plans) {
+      this.handles?.settle();
+      page.replace(message);
+      this.handles?.update(handles);
+      this.drawHandles(handles);
+      if (coarse) this.handles?.carry();
+    }
+    if (!coarse) this.drawNumbers(message.table);
+    get("plots").classList.toggle("stale", brief);
+    document.documentElement.dataset.brief = brief;
+    this.judge(message);
+  }
+
+  // Say what is shown: verified only where it answers what was asked last.
+  judge(message) {
+    this.last = message;
+    const open = message.kind === "coarse" || this.answered !== this.asked;
+    const verified = message.kind === "whole" && message.plans[0].verified && !open;
+    get("verdict").textContent = open && message.kind !== "coarse" ? "planning …" : message.words;
+    get("verdict").className = open ? "coarse" : verified ? "verified" : "";
+    get("figures").classList.toggle("stale", open);
+    this.page.stage?.setGrey(!verified);
+    document.documentElement.dataset.live = open ? "coarse" : verified ? "verified" : "stopped";
+  }
+
+  drawNumbers(table) {
+    if (!table) return;
+    const rows = table.filter(({ label }) => TOLD.includes(label) || label.startsWith("closest to"));
+    get("figures").replaceChildren();
+    for (const { label, cells: [[value, note]] } of rows) {
+      element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
+      const cell = element(get("figures"), "dd", {}, value);
+      if (note) element(cell, "small", {}, ` ${note}`);
+    }
+  }
+
+  // Handles
+
+  drawHandles(handles) {
+    const names = handles.map(({ name }) => name);
+    if (String(names) === String(this.named)) return;
+    this.named = names;
+    get("handles").replaceChildren();
+    for (const name of names) {
+      const button = element(get("handles"), "button", { type: "button", "data-handle": name, "aria-pressed": false }, name);
+      button.addEventListener("click", () => this.handles?.choose(this.handles.name === name ? undefined : name));
+    }
+    this.chose(this.handles?.chosen);
+  }
+
+  chose(handle) {
+    for (const button of get("handles").children) {
+      button.setAttribute("aria-pressed", button.dataset.handle === handle?.name);
+    }
+    get("turns").hidden = !(handle?.turns && handle.moves);
+    get("letgo").hidden = !handle;
+    this.drawTurns();
+  }
+
+  drawTurns() {
+    get("turns").textContent = this.handles?.turns ? "Move it" : "Turn it";
+  }
+
+  // Sliders
+
+  drawSliders(sliders) {
+    const names = sliders.map(({ name }) => name);
+    if (String(names) !== String([...this.sliders.keys()])) this.makeSliders(sliders);
+    for (const slider of sliders) {
+      const known = this.sliders.get(slider.name);
+      Object.assign(known.slider, slider);
+      // What was slid since then is newer than what is told.
+      if (this.asked !== this.answered) continue;
+      known.input.value = place(slider, slider.value);
+      known.output.textContent = number(slider.value, slider.unit);
+    }
+  }
+
+  makeSliders(sliders) {
+    get("sliders").replaceChildren();
+    this.sliders.clear();
+    for (const given of sliders) {
+      const slider = { ...given };
+      const line = element(get("sliders"), "label", {});
+      element(line, "span", {}, slider.name);
+      const input = element(line, "input", {
+        type: "range", min: 0, max: STEPS, step: 1, "data-slider": slider.name, "aria-label": slider.name });
+      const output = element(line, "output", {});
+      const slide = (final) => {
+        const value = at(slider, Number(input.value));
+        output.textContent = number(value, slider.unit);
+        this.ask({ do: "slide", name: slider.name, value, final });
+      };
+      input.addEventListener("input", () => slide(false));
+      input.addEventListener("change", () => slide(true));
+      this.sliders.set(slider.name, { slider, input, output });
+    }
+  }
+
+  async export() {
+    const suffix = get("export").value;
+    get("export").value = "";
+    if (!suffix) return;
+    this.say(`Writing ${suffix} …`);
+    const answer = await fetch(`/export?as=${suffix}&token=${encodeURIComponent(this.token)}`);
+    if (!answer.ok) {
+      this.say(await answer.text(), true);
+      return;
+    }
+    const name = answer.headers.get("Content-Disposition").match(/filename="(.*)"/)[1];
+    offer(await answer.blob(), name);
+    this.say(`Exported ${name}.`);
+  }
+}
+
+// Where on a slider a value is, and the other way round: by even factors, or even differences.
+function place({ low, high, even }, value) {
+  const share = even ? (value - low) / (high - low) : Math.log(value / low) / Math.log(high / low);
+  return Math.round(STEPS * share);
+}
+
+function at({ low, high, even }, step) {
+  const share = step / STEPS;
+  const value = even ? low + share * (high - low) : low * (high / low) ** share;
+  // Three digits are as many as a hand can set.
+  return Math.min(Math.max(Number(value.toPrecision(3)), low), high);
+}
+
+function number(value, unit) {
+  return `${Number(value.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
+}

@@ -1,0 +1,10 @@
+"""A page that shows a plan while its problem is changed: handles, sliders, undo, save, export."""
+
+from selfmotion.shell.view.server import (
+    application as application,
+    check_server as check_server,
+    configuration as configuration,
+    listening as listening,
+    serve as serve,
+)
+from selfmotion.shell.view.session import Session as Session

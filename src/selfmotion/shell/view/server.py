@@ -1,0 +1,227 @@
+"""The server of the page: on this machine only, for who has the token, for one tab at a time."""
+
+import asyncio
+import hmac
+import json
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from selfmotion.basics import RenderError, SelfmotionError
+from selfmotion.shell.view.session import Session
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette
+    from starlette.websockets import WebSocket
+
+HOST = "127.0.0.1"
+# How a connection is ended: without the token, and where another tab has the page.
+REFUSED, TAKEN = 4403, 4409
+# Messages of the page are short [bytes].
+_LONGEST = 65_536
+
+
+def check_server() -> None:
+    """Raise RenderError where the packages of the server are missing."""
+    try:
+        import starlette
+        import tomlkit
+        import uvicorn
+        import websockets
+    except ImportError as error:
+        raise RenderError(
+            f"the page needs the package {error.name}: pip install 'selfmotion[view]'"
+        ) from None
+    del starlette, tomlkit, uvicorn, websockets
+
+
+def serve(
+    session: Session,
+    *,
+    port: int = 0,
+    opens: bool = True,
+    told: Callable[[str], None] = print,
+) -> None:
+    """Serve the page until Ctrl-C.
+
+    Parameters
+    ----------
+    session : Session
+    port : int
+        0 for a free one.
+    opens : bool
+        Whether the browser is opened.
+    told : callable
+        Called with the address, which holds the token.
+
+    Raises
+    ------
+    RenderError
+        Packages are missing, or the port is taken.
+    """
+    import uvicorn
+
+    bound = listening(port)
+    token = secrets.token_urlsafe(24)
+    number = bound.getsockname()[1]
+    address = f"http://{HOST}:{number}/?token={token}"
+    server = uvicorn.Server(configuration(application(session, token, number)))
+    told(address)
+    if opens:
+        webbrowser.open(address)
+    try:
+        server.run(sockets=[bound])
+    except KeyboardInterrupt:
+        # The way in which this ends.
+        pass
+    finally:
+        bound.close()
+        session.close()
+
+
+def listening(port: int) -> socket.socket:
+    """Return a socket at a port of this machine alone; RenderError where it is taken."""
+    bound = socket.socket()
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind((HOST, port))
+    except OSError as error:
+        bound.close()
+        raise RenderError(
+            f"port {port} is taken ({error.strerror}); give another --port, or none for a free one"
+        ) from None
+    return bound
+
+
+def configuration(app: "Starlette") -> Any:
+    """Return how the application is served: without a log, since addresses hold the token."""
+    import uvicorn
+
+    return uvicorn.Config(
+        app,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        ws="websockets-sansio",
+        ws_max_size=_LONGEST,
+        timeout_graceful_shutdown=1,
+    )
+
+
+def application(session: Session, token: str, port: int) -> "Starlette":
+    """Return the application: the page, its connection, and the exported files."""
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import HTMLResponse, PlainTextResponse, Response
+    from starlette.routing import Route, WebSocketRoute
+
+    # Another name for this machine is one that a foreign page may have given it.
+    hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+
+    def refusal(request: "Request | WebSocket") -> str:
+        """Return why a request is refused; "" for none."""
+        if request.headers.get("host") not in hosts:
+            return f"this page is served as {HOST}:{port} only"
+        origin = request.headers.get("origin")
+        if origin is not None and origin.removeprefix("http://") not in hosts:
+            return "another page asks for this one"
+        given = request.query_params.get("token", "")
+        if not hmac.compare_digest(given.encode(), token.encode()):
+            return "the token is missing or wrong; open the address that `selfmotion view` printed"
+        return ""
+
+    async def page(request: Request) -> Response:
+        if why := refusal(request):
+            return PlainTextResponse(f"refused: {why}\n", status_code=403)
+        return HTMLResponse(session.html, headers=_HEADERS)
+
+    async def export(request: Request) -> Response:
+        if why := refusal(request):
+            return PlainTextResponse(f"refused: {why}\n", status_code=403)
+        suffix = request.query_params.get("as", "")
+        try:
+            data = await asyncio.to_thread(session.export, suffix)
+        except SelfmotionError as error:
+            return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
+        name = f"{session.edited.file.stem}{suffix}".replace('"', "")
+        headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="{name}"'}
+        return Response(data, media_type="application/octet-stream", headers=headers)
+
+    async def live(connection: "WebSocket") -> None:
+        await connection.accept()
+        if why := refusal(connection):
+            await connection.close(REFUSED, why[:100])
+            return
+        outgoing: asyncio.Queue[bytes] = asyncio.Queue()
+        loop = asyncio.get_running_loop()
+
+        def send(data: bytes) -> None:
+            loop.call_soon_threadsafe(outgoing.put_nowait, data)
+
+        if not await asyncio.to_thread(session.attach, send):
+            await connection.close(TAKEN, "another tab has this page")
+            return
+        try:
+            await _both(connection, session, outgoing)
+        finally:
+            session.detach()
+
+    routes = [
+        Route("/", page),
+        Route("/export", export),
+        WebSocketRoute("/live", live),
+    ]
+    return Starlette(routes=routes)
+
+
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+async def _both(
+    connection: "WebSocket", session: Session, outgoing: "asyncio.Queue[bytes]"
+) -> None:
+    """Hear and tell at the same time, until the page is closed."""
+    hearing = asyncio.create_task(_hear(connection, session))
+    telling = asyncio.create_task(_say(connection, outgoing))
+    done, others = await asyncio.wait({hearing, telling}, return_when=asyncio.FIRST_COMPLETED)
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*others, return_exceptions=True)
+    for task in done:
+        task.result()
+
+
+async def _hear(connection: "WebSocket", session: Session) -> None:
+    from starlette.websockets import WebSocketDisconnect
+
+    while True:
+        try:
+            text = await connection.receive_text()
+        except (WebSocketDisconnect, KeyError):
+            # A page that sends bytes is none of ours.
+            return
+        try:
+            asked = json.loads(text)
+            answer = await asyncio.to_thread(session.answer, asked)
+        except ValueError as error:
+            answer = {"error": f"the page sent what is no JSON: {error}"}
+        except SelfmotionError as error:
+            answer = {"error": str(error)}
+        if answer is not None:
+            await connection.send_text(json.dumps(answer, allow_nan=False))
+
+
+async def _say(connection: "WebSocket", outgoing: "asyncio.Queue[bytes]") -> None:
+    while True:
+        data = await outgoing.get()
+        # Of several that wait the last one says all.
+        while not outgoing.empty():
+            data = outgoing.get_nowait()
+        await connection.send_bytes(data)

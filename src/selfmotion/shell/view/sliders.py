@@ -1,0 +1,117 @@
+"""Numbers of a document that are set by sliders: feed, clearance, tolerances, weights of costs."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from selfmotion.shell.replay.meshes import Json
+from selfmotion.shell.view.document import Keys, at
+
+# A slider goes from a part of its number to a multiple; where it begins at 0, to this [m].
+_SPAN, _CLEARANCES = 8.0, 0.1
+# Keys of sections: what their sliders are called, and in which unit.
+_OF_PATH = {
+    "feed": ("feed", "m/s"),
+    "feed_mm": ("feed", "mm/s"),
+    "duration": ("duration", "s"),
+}
+_OF_TOLERANCE = {
+    "position": ("tolerance of position", "m"),
+    "position_mm": ("tolerance of position", "mm"),
+    "rotation": ("tolerance of rotation", "rad"),
+    "rotation_deg": ("tolerance of rotation", "°"),
+}
+_WEIGHTS = ("weight", "mu")
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number with the range in which it is slid.
+
+    Attributes
+    ----------
+    name : str
+    keys : tuple
+        The way to it in the document.
+    value, low, high : float
+        In the document's unit.
+    unit : str
+    even : bool
+        Whether equal ways of the slider are equal differences, rather than equal factors.
+    """
+
+    name: str
+    keys: Keys
+    value: float
+    low: float
+    high: float
+    unit: str
+    even: bool = False
+
+    @property
+    def json(self) -> Json:
+        """What the page has to know."""
+        return {
+            "name": self.name,
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "unit": self.unit,
+            "even": self.even,
+        }
+
+
+def sliders_of(document: Mapping[str, Any], begun: Mapping[str, Any]) -> dict[str, Slider]:
+    """Return the sliders of a document by name, with ranges about what it `begun` with."""
+    return {slider.name: slider for slider in _sliders(document, begun)}
+
+
+def _sliders(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[Slider]:
+    for key, (name, unit) in _OF_PATH.items():
+        yield from _about(document, begun, ("path", key), name, unit)
+    yield from _clearance(document, begun)
+    for key, (name, unit) in _OF_TOLERANCE.items():
+        yield from _about(document, begun, ("tolerance", key), name, unit)
+    for k, item in enumerate(document.get("relaxations", [])):
+        rows = item.get("rows", "")
+        name = f"band of {rows if isinstance(rows, str) else ', '.join(rows)}"
+        for key, unit in (("band", ""), ("band_mm", "mm"), ("band_deg", "°")):
+            yield from _about(document, begun, ("relaxations", k, key), name, unit)
+    for k, item in enumerate(document.get("costs", [])):
+        for key in _WEIGHTS:
+            yield from _about(document, begun, ("costs", k, key), f"weight of {item['kind']}", "")
+
+
+def _about(
+    document: Mapping[str, Any], begun: Mapping[str, Any], keys: Keys, name: str, unit: str
+) -> Iterator[Slider]:
+    value, first = at(document, keys), at(begun, keys)
+    first = value if not _is_number(first) else first
+    if _is_number(value) and value > 0.0 and first > 0.0:
+        low, high = min(first / _SPAN, value), max(first * _SPAN, value)
+        yield Slider(name, keys, float(value), low, high, unit)
+
+
+def _clearance(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[Slider]:
+    """Return the slider of the distance that bodies keep."""
+    tables: list[Keys] = [
+        ("constraints", k)
+        for k, item in enumerate(document.get("constraints", []))
+        if item.get("kind") == "Clearance"
+    ]
+    # Without one of its own a problem keeps the arm off itself, unless it says false.
+    if not tables and (isinstance(document.get("clearance", {}), Mapping)):
+        tables = [("clearance",)]
+    for keys in tables:
+        key = "distance_mm" if at(document, (*keys, "distance_mm")) is not None else "distance"
+        unit, most = ("mm", 1e3 * _CLEARANCES) if key.endswith("_mm") else ("m", _CLEARANCES)
+        value = at(document, (*keys, key))
+        value = float(value) if _is_number(value) else 0.0
+        first = at(begun, (*keys, key))
+        high = max(most, 2.0 * value, 2.0 * first if _is_number(first) else 0.0)
+        yield Slider("clearance", (*keys, key), value, 0.0, high, unit, even=True)
+        return
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

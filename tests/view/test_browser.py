@@ -1,0 +1,266 @@
+"""The page in a browser: what is dragged and slid is planned, and nothing leaves this machine."""
+
+import re
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from support.layouts import WIDTHS, chromium, faults
+from support.views import CIRCLE, Served, served
+
+# So often each handle is dragged, and each slider moved; `make bench NAME=view` does so more often.
+TIMES = 3
+# How far the mouse goes [px].
+PIXELS = 5.0
+# What tells, and what is worked with.
+TEXTS = ("h1", "#verdict", "#told", "#change h2", "#figures dd", "#sliders span", "#sliders output")
+BOXES = (
+    "#said", "#legend", "#layers", "#play", "#time", "#undo", "#save", "#export", "#handles button",
+    "#turns", "#letgo", "#sliders input", "#figures", "#jog", "#measure",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser() -> Any:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    file = tmp_path_factory.mktemp("view") / "circle.toml"
+    file.write_text(CIRCLE)
+    with served(file) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, server: Served) -> Any:
+    # Pixels are drawn without a graphics card: few are enough.
+    page = browser.new_page(viewport={"width": 640, "height": 480}, reduced_motion="reduce")
+    page.complaints, page.requests = [], []
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.on(
+        "console",
+        lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None,
+    )
+    page.on("request", lambda request: page.requests.append(request.url))
+    page.on("websocket", lambda socket: page.requests.append(socket.url))
+    page.goto(server.address)
+    page.wait_for_selector("html[data-live=verified]", timeout=60_000)
+    yield page
+    quiet = ("GPU stall", "409 (Conflict)")  # of the machine; of the file that is refused
+    loud = [text for text in page.complaints if not any(part in text for part in quiet)]
+    assert loud == []
+    hosts = {urlsplit(url).hostname for url in page.requests if url[:5] not in ("data:", "blob:")}
+    assert hosts == {"127.0.0.1"}
+    page.close()
+
+
+# What of the scene moves when it is dragged: its mark, as the mouse has it.
+GRAB = """(axis) => {
+  const { controls, shown, name } = replay.live.handles;
+  const { mark } = shown.get(name);
+  viewer.scene.updateMatrixWorld(true);
+  const box = viewer.renderer.domElement.getBoundingClientRect();
+  const seen = (point) => {
+    const { x, y } = point.clone().project(viewer.camera);
+    return [box.left + (0.5 + x / 2) * box.width, box.top + (0.5 - y / 2) * box.height];
+  };
+  const at = new THREE.Vector3().setFromMatrixPosition(mark.matrixWorld);
+  // The arrow of an axis ends at half of the control's size, which is the same on each screen.
+  const high = 1.9 * Math.tan((Math.PI * viewer.camera.fov) / 360);
+  const size = (at.distanceTo(viewer.camera.position) * high * controls.size) / 4;
+  const ahead = (part) => at.clone().add(new THREE.Vector3().setComponent(axis, part * size));
+  return [seen(ahead(0.35)), seen(ahead(0.45))];
+}"""
+
+
+SEEN = """(name) => {
+  const { x, y } = new THREE.Vector3().setFromMatrixPosition(
+    replay.live.handles.shown.get(name).mark.matrixWorld).project(viewer.camera);
+  const box = viewer.renderer.domElement.getBoundingClientRect();
+  return [box.left + (0.5 + x / 2) * box.width, box.top + (0.5 - y / 2) * box.height];
+}"""
+
+
+def settled(page: Any, server: Served) -> sm.Plan:
+    """Return the plan that is shown when all that was asked for is answered."""
+    page.wait_for_function(
+        """() => {
+          const { asked, answered } = replay.live;
+          const { live } = document.documentElement.dataset;
+          return asked === answered && ["verified", "stopped"].includes(live);
+        }""",
+        timeout=60_000,
+    )
+    return server.session.found.plan
+
+
+def saved(page: Any, server: Served) -> sm.Plan:
+    """Save, and return what `selfmotion plan` makes of the file."""
+    if page.locator("#save").is_enabled():
+        page.locator("#save").click()
+        page.locator("#told", has_text="Saved.").wait_for()
+    job = sm.files.read_job(server.session.edited.file)
+    return sm.plan(job.problem, **job.settings)
+
+
+def assert_same(shown: sm.Plan, plan: sm.Plan) -> None:
+    np.testing.assert_array_equal(shown.trajectory.q, plan.trajectory.q)
+    assert shown.report.cost == plan.report.cost
+
+
+def drag(page: Any, name: str, way: float) -> None:
+    """Drag a handle by the mouse, by the arrow of x, there or back."""
+    if page.locator(f"[data-handle='{name}']").get_attribute("aria-pressed") != "true":
+        page.locator(f"[data-handle='{name}']").click()
+    page.locator("#view").scroll_into_view_if_needed()
+    (x, y), (ahead, below) = page.evaluate(GRAB, 0)
+    along = np.array([ahead - x, below - y])
+    along *= way * PIXELS / np.linalg.norm(along)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for share in (0.3, 0.6, 1.0):
+        page.mouse.move(*(np.array([x, y]) + share * along))
+    page.mouse.up()
+
+
+@pytest.mark.parametrize("name", ["path", "base", "post"])
+def test_a_handle_is_dragged_and_the_plan_follows(page: Any, server: Served, name: str) -> None:
+    """Each time the document is another one; in the end the plan is that of the file."""
+    before = server.session.edited.document
+    for k in range(TIMES):
+        # Twice as far there as back, so that each place is a new one.
+        drag(page, name, 1.0 if k % 2 == 0 else -0.5)
+        shown = settled(page, server)
+        assert server.session.edited.document != before
+        before = server.session.edited.document
+    assert shown.certificate.verified == page.locator("#verdict.verified").is_visible()
+    assert_same(shown, saved(page, server))
+
+
+def test_the_tool_is_turned(page: Any, server: Served) -> None:
+    page.locator("[data-handle=tool]").click()
+    assert page.evaluate("replay.live.handles.controls.mode") == "rotate"
+    for k in range(TIMES):
+        # By what the ring of z does when it is dragged.
+        page.evaluate(
+            """(angle) => {
+              const { handles } = replay.live;
+              const { mark } = handles.shown.get("tool");
+              handles.grip(true);
+              mark.rotateZ(angle);
+              handles.dragged();
+              handles.grip(false);
+            }""",
+            0.05 if k % 2 == 0 else -0.03,
+        )
+        shown = settled(page, server)
+    assert "tool_offset" in server.session.edited.document["robot"]
+    assert_same(shown, saved(page, server))
+
+
+@pytest.mark.parametrize("name", ["duration", "clearance", "weight of JointVelocity"])
+def test_a_slider_is_moved_and_the_plan_follows(page: Any, server: Served, name: str) -> None:
+    slider = page.locator(f"[data-slider='{name}']")
+    begun = int(slider.input_value())
+    for k in range(TIMES):
+        place = begun + (8 if k % 2 == 0 else 4)
+        slider.fill(str(place))
+        shown = settled(page, server)
+    assert shown.certificate.verified
+    assert int(slider.input_value()) == place
+    assert_same(shown, saved(page, server))
+
+
+def test_undo_goes_back(page: Any, server: Served) -> None:
+    before = server.session.edited.document
+    page.locator("[data-slider=duration]").fill("240")
+    settled(page, server)
+    assert server.session.edited.document != before
+    page.locator("#undo").click()
+    settled(page, server)
+    assert server.session.edited.document == before
+
+
+def test_what_stops_it_is_said_and_red(page: Any, server: Served) -> None:
+    page.evaluate("""() => {
+      const { handles, ask } = replay.live;
+      const matrix = handles.shown.get("path").handle.matrix.slice();
+      matrix[12] += 3;
+      replay.live.ask({ do: "drag", name: "path", matrix, final: true });
+    }""")
+    settled(page, server)
+    assert page.locator("html[data-live=stopped]").count() == 1
+    assert "no configuration" in page.locator("#verdict").inner_text()
+    color = """() => { let found; viewer.find("/selfmotion/plan0/tip0/stopped").traverse(
+      (object) => { found = object.material?.color.getHexString() ?? found; }); return found; }"""
+    red, green, blue = (int(page.evaluate(color)[k : k + 2], 16) for k in (0, 2, 4))
+    assert red > 5 * max(green, blue)
+    page.locator("#undo").click()
+    settled(page, server)
+    assert page.locator("html[data-live=verified]").count() == 1
+
+
+def test_a_motion_is_exported(page: Any, server: Served) -> None:
+    with page.expect_download() as found:
+        page.locator("#export").select_option(".csv")
+    assert found.value.suggested_filename == "circle.csv"
+    page.locator("#export").select_option(".mod")
+    page.wait_for_selector("#told.bad")
+    assert "mass" in page.locator("#told").inner_text()
+
+
+def test_joints_are_jogged_and_come_back(page: Any, server: Served) -> None:
+    page.locator("#jog summary").click()
+    place = """() => { const node = viewer.find("/selfmotion/robot/panda_joint2");
+      node.updateWorldMatrix(true, false); return node.matrixWorld.toArray(); }"""
+    before = page.evaluate(place)
+    page.locator("[data-joint=panda_joint1]").fill("1.0")
+    assert page.evaluate(place) != before
+    assert "jogged by hand" in page.locator("#pair").inner_text()
+    # What is told of the plan later does not take it away.
+    jogged = page.evaluate(place)
+    page.evaluate("replay.live.take(replay.live.last)")
+    np.testing.assert_allclose(page.evaluate(place), jogged)
+    page.evaluate("replay.seek(replay.now)")
+    np.testing.assert_allclose(page.evaluate(place), before)
+    page.locator("#jog summary").click()
+
+
+def test_a_distance_is_measured(page: Any, server: Served) -> None:
+    page.evaluate("replay.live.handles.choose(undefined)")
+    page.locator("#measure").click()
+    page.locator("#view").scroll_into_view_if_needed()
+    hits: list[str] = []
+    for name in ("post", "base"):
+        page.mouse.click(*page.evaluate(SEEN, name))
+        hits.append(page.locator("#measured").inner_text())
+    assert hits[0] == "and another one"
+    assert re.fullmatch(r"\d+\.\d mm", hits[1])
+    points = page.evaluate("""() => replay.measure.points.map((point) => point.toArray())""")
+    apart = 1e3 * float(np.linalg.norm(np.subtract(*points)))
+    assert float(hits[1].removesuffix(" mm")) == pytest.approx(apart, abs=0.051)
+    page.locator("#measure").click()
+
+
+def test_a_second_tab_is_told(browser: Any, page: Any, server: Served) -> None:
+    second = browser.new_page(viewport={"width": 640, "height": 480}, reduced_motion="reduce")
+    second.goto(server.address)
+    second.wait_for_selector("html[data-live=taken]", timeout=60_000)
+    assert "Another tab has this page" in second.locator("#told").inner_text()
+    assert second.locator("#change").evaluate("panel => panel.inert")
+    second.close()
+    assert page.evaluate("replay.live.socket.readyState") == 1
+
+
+def test_it_is_seen_whole(page: Any, server: Served) -> None:
+    page.locator("[data-handle=post]").click()
+    page.evaluate("scrollTo(0, 0)")
+    for width in WIDTHS:
+        assert faults(page, TEXTS, BOXES, width) == [], width
+    page.set_viewport_size({"width": 640, "height": 480})
