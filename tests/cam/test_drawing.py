@@ -352,6 +352,19 @@ def test_blocks_are_what_they_are_made_of(tmp_path: Path) -> None:
     assert list(read_drawing(tmp_path / "part.dxf", "cut 1")) == ["cut 1", "cut 2"]
 
 
+@pytest.mark.parametrize(("code", "axis"), [(41, "x"), (42, "y")])
+def test_a_block_without_width_is_refused(code: int, axis: str, tmp_path: Path) -> None:
+    document = ezdxf.new("R2010", units=4)
+    document.blocks.new("clip").add_line((0, 0), (10, 5))
+    document.modelspace().add_blockref("clip", (10, 0), {"zscale": 1.5})
+    file = tmp_path / "part.dxf"
+    document.saveas(file)
+    # CAD programs write such files; ezdxf would not.
+    file.write_text(file.read_text().replace(" 43\n1.5\n", f"{code:3d}\n0.0\n 43\n1.0\n"))
+    with pytest.raises(sm.errors.FileFormatError, match=f"'clip' has scale 0 along {axis}"):
+        read_drawing(file)
+
+
 def test_blocks_of_blocks_without_end_are_refused(tmp_path: Path) -> None:
     document = ezdxf.new("R2010", units=4)
     document.blocks.new("b0").add_line((0, 0), (1, 0))

@@ -167,6 +167,12 @@ def _entities(
                 f"{file}: layer '{layer}': {label} puts a block that the drawing does not have; "
                 f"delete it in CAD, or switch its layer off"
             )
+        for axis in "xy":
+            if entity.dxf.get(f"{axis}scale", 1.0) == 0.0:
+                raise FileFormatError(
+                    f"{file}: layer '{layer}': {label} has scale 0 along {axis}, which leaves no "
+                    f"contour of it: expected another scale; place the block again in CAD"
+                )
         if entity.dxf.zscale == 0.0:
             # As programs for 2-D drawings write it.
             entity.dxf.zscale = 1.0
