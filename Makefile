@@ -14,14 +14,14 @@ help:  ## this list
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
-# The site runs every example for minutes, and a browser draws every arm: a target of its own.
+# The site runs every example, a browser draws every arm and drags on pages: a target of its own.
 TWO := --numprocesses 2 -m 'not site'
 
 test: $(READY)  ## all tests but those of `test-site`, on two cores
 	$(BIN)/pytest $(TWO) --dist loadfile --no-loadscope-reorder --keep-durations
 
 test-site: $(READY)  ## the site, built with every example and looked at; and every arm's replay
-	$(BIN)/pytest -m site tests/docs/test_site.py tests/replay/test_browser.py
+	$(BIN)/pytest -m site tests/docs/test_site.py tests/replay/test_browser.py tests/view/test_browser.py
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync lint quick

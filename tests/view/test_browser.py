@@ -11,6 +11,9 @@ import selfmotion as sm
 from support.layouts import WIDTHS, chromium, faults
 from support.views import CIRCLE, Served, served
 
+# A page that plans in a browser without a graphics card takes seconds for each drag.
+pytestmark = pytest.mark.site
+
 # So often each handle is dragged, and each slider moved; `make bench NAME=view` does so more often.
 TIMES = 3
 # How far the mouse goes [px].
