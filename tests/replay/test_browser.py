@@ -296,7 +296,8 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     *others, clearance = plan.problem.constraints
     world = clearance.model(plan.robot)
     # Nearer than twice what is asked: of what is farther apart nothing is coloured.
-    asked = (*others, Clearance(clearance.obstacles, 1.0))
+    near = max(world.distance(plan.trajectory(time)).value for time in (0.5, 2.0))
+    asked = (*others, Clearance(clearance.obstacles, 0.6 * near))
     plan = replace(plan, problem=replace(plan.problem, constraints=asked))
     page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):

@@ -10,13 +10,13 @@ from selfmotion.basics import silent
 from support.places import DATA
 
 # Random starts at each pixel: enough for a few columns.
-STARTS = 24
+STARTS = 48
 
 
 def test_a_map_is_accepted_and_a_shifted_one_refused() -> None:
     problem = load(DATA / "panda__1cube")
     found, _ = plan(problem, 0, silent)
-    shown = found.redundancy_map(shape=(2, 11))
+    shown = found.redundancy_map(shape=(2, 31))
     assert not differences(found, shown, problem, STARTS).any()
     shifted = replace(shown, state=np.roll(shown.state, 1, axis=1))
     wrong = differences(found, shifted, problem, STARTS)
