@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import urllib.error
+import urllib.parse
 import urllib.request
 
 import pytest
@@ -103,7 +104,8 @@ def test_the_connection_is_for_who_has_the_token_and_for_one_tab(server):
 def test_what_is_no_json_is_answered_and_the_connection_stays(server):
     with live(server) as page:
         page.recv(60)
-        for text in ("{", "[]", "5", '{"do": "slide", "name": "duration", "value": NaN}'):
+        not_a_number = '{"do": "slide", "name": "duration", "value": NaN}'
+        for text in ("{", "[]", "5", "[" * 60_000, not_a_number):
             page.send(text)
             assert "error" in json.loads(page.recv(60))
         page.send(json.dumps({"do": "save"}))
@@ -114,7 +116,7 @@ def test_what_is_no_json_is_answered_and_the_connection_stays(server):
 def test_files_are_exported(server):
     status, headers, text = answer(server, f"/export?token={TOKEN}&as=.csv")
     assert status == 200
-    assert headers["content-disposition"] == 'attachment; filename="circle.csv"'
+    assert headers["content-disposition"] == "attachment; filename*=UTF-8''circle.csv"
     assert text.startswith("t,")
     status, _, text = answer(server, f"/export?token={TOKEN}&as=.exe")
     assert status == 409
@@ -144,3 +146,13 @@ def test_nobody_else_imports_the_server():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_files_with_any_name_are_exported(tmp_path):
+    file = tmp_path / 'löten "日本".toml'
+    file.write_text(CIRCLE)
+    with served(file) as named:
+        status, headers, _ = answer(named, f"/export?token={TOKEN}&as=.csv")
+    assert status == 200
+    name = headers["content-disposition"].removeprefix("attachment; filename*=UTF-8''")
+    assert urllib.parse.unquote(name) == 'löten "日本".csv'

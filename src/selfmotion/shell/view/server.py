@@ -8,6 +8,7 @@ import socket
 import webbrowser
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from selfmotion.basics import RenderError, SelfmotionError
 from selfmotion.shell.view.session import Session
@@ -145,8 +146,9 @@ def application(session: Session, token: str, port: int) -> "Starlette":
             data = await asyncio.to_thread(session.export, suffix)
         except SelfmotionError as error:
             return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
-        name = f"{session.edited.file.stem}{suffix}".replace('"', "")
-        headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="{name}"'}
+        # Headers are Latin-1: other letters of the name are told as those of an address are.
+        name = quote(f"{session.edited.file.stem}{suffix}", safe="", errors="replace")
+        headers = {**_HEADERS, "Content-Disposition": f"attachment; filename*=UTF-8''{name}"}
         return Response(data, media_type="application/octet-stream", headers=headers)
 
     async def live(connection: "WebSocket") -> None:
@@ -210,7 +212,7 @@ async def _hear(connection: "WebSocket", session: Session) -> None:
         try:
             asked = json.loads(text)
             answer = await asyncio.to_thread(session.answer, asked)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             answer = {"error": f"the page sent what is no JSON: {error}"}
         except SelfmotionError as error:
             answer = {"error": str(error)}

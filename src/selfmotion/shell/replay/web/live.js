@@ -208,7 +208,7 @@ class Live {
       this.say(await answer.text(), true);
       return;
     }
-    const name = answer.headers.get("Content-Disposition").match(/filename="(.*)"/)[1];
+    const name = decodeURIComponent(answer.headers.get("Content-Disposition").split("UTF-8''")[1]);
     offer(await answer.blob(), name);
     this.say(`Exported ${name}.`);
   }
