@@ -1,5 +1,6 @@
 """The server: on this machine only, for who has the token, and for one tab."""
 
+import asyncio
 import json
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from selfmotion.basics import RenderError
-from selfmotion.shell.view import check_server, listening
+from selfmotion.shell.view import application, check_server, listening
 from support.views import CIRCLE, TOKEN, served, told
 
 
@@ -57,6 +58,21 @@ def test_a_foreign_page_gets_nothing(server, host, origin):
     assert status == 403
     assert text.startswith("refused: ")
     assert len(text) < 200
+
+
+@pytest.mark.parametrize(("port", "status"), [(80, 200), (8080, 403)])
+def test_browsers_leave_out_the_port_of_http(server, port, status):
+    app = application(server.session, TOKEN, port)
+    found = []
+
+    async def send(message):
+        found.append(message)
+
+    headers = [(b"host", b"127.0.0.1"), (b"origin", b"http://127.0.0.1")]
+    query = f"token={TOKEN}".encode()
+    scope = {"type": "http", "method": "GET", "path": "/", "query_string": query}
+    asyncio.run(app({**scope, "headers": headers}, None, send))
+    assert found[0]["status"] == status
 
 
 def test_it_listens_on_this_machine_only():

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 # How a connection is ended: without the token, and where another tab has the page.
 REFUSED, TAKEN = 4403, 4409
+# The port that addresses without one have.
+_HTTP = 80
 # Messages of the page are short [bytes].
 _LONGEST = 65_536
 
@@ -119,7 +121,9 @@ def application(session: Session, token: str, port: int) -> "Starlette":
     from starlette.routing import Route, WebSocketRoute
 
     # Another name for this machine is one that a foreign page may have given it.
-    hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+    names = (HOST, "localhost")
+    # Browsers leave out the port of HTTP.
+    hosts = {f"{name}:{port}" for name in names} | set(names if port == _HTTP else ())
 
     def refusal(request: "Request | WebSocket") -> str:
         """Return why a request is refused; "" for none."""
