@@ -203,6 +203,7 @@ def test_a_page_loaded_anew_shows_what_is_planned(page: Any, server: Served) -> 
       replay.live.changed = false;
     }""")
     page.reload()
+    page.wait_for_selector("html[data-live]", timeout=60_000)
     settled(page, server)
     assert page.locator("html[data-live=verified]").count() == 1
     assert server.session.found.plan.trajectory.duration == 4.0
