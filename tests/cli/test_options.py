@@ -183,3 +183,14 @@ def test_angles_beyond_a_turn_are_meant_in_degrees(options: list[str], said: str
         assert "in degrees?" in text
     else:
         assert relaxation(options[-1]).band == np.inf
+
+
+@pytest.mark.parametrize(
+    ("goal", "what"), [("fastest", "the fastest motion"), ("parts", "a motion in parts")]
+)
+def test_options_without_effect_on_a_goal_are_refused(tmp_path: Path, goal: str, what: str) -> None:
+    file = tmp_path / "problem.toml"
+    assert invoke("init", "panda", "--out", file)[0] == 0
+    for option in ("--deadline", "--max-evaluations"):
+        said = complaint("plan", file, option, "9", "--set", f"goal={goal}")
+        assert f"{option} has no effect on {what}" in " ".join(said.split())

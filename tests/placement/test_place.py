@@ -1,7 +1,9 @@
 """Places: what is found is no worse than a grid of places, each planned on its own."""
 
 import importlib
+import json
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -361,6 +363,78 @@ def test_a_job_is_placed_as_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         "place", tmp_path / "job.toml", *ranges, "--out", tmp_path.parent / "a.toml"
     )
     assert "beside" in elsewhere
+
+
+ALONE = """
+task = "position"
+[robot]
+name = "panda"
+base = { position = [0.2, 0.1, 0.0], rpy_deg = [0, 0, 90] }
+reference = "panda_link0"
+[[seams]]
+name = "there"
+path = { kind = "line", duration = 1.0, by = [0.1, 0, 0], start = { position = [0.4, 0, 0.4] } }
+"""
+
+
+def test_a_job_in_the_frame_of_a_base_is_written_where_it_was_placed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Places are in the world, paths in the frame of the base, which is turned."""
+    # JSON's null counts as absent: TOML has none.
+    document = tomllib.loads(ALONE) | {"costs": None}
+    (tmp_path / "job.json").write_text(json.dumps(document))
+    out = tmp_path / "there.toml"
+
+    def one_place(places: Places, *_: object) -> tuple[Tried, list[Tried]]:
+        found = places.tried(np.array([0.03]))
+        return found, [found]
+
+    monkeypatch.setattr(
+        importlib.import_module("selfmotion.work.placement.place"), "best_place", one_place
+    )
+    code, text = invoke("place", tmp_path / "job.json", "--x", "-0.05,0.05", "--out", out)
+    assert code == 0, text
+    starts = []
+    for file in (tmp_path / "job.json", out):
+        (problem,) = sm.files.read_seam_job(file).problems
+        frame = problem.follows.items[0].chain.base_placement
+        starts.append(frame.act(problem.path.pose(0.0).translation))
+    np.testing.assert_allclose(starts[1] - starts[0], [0.03, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (JOB, ("--part", "wall", "--part", "clamp"), "to which belongs clamp, not wall, clamp"),
+        (JOB, ("--part", "wall"), "to which belongs clamp, not wall"),
+        (JOB, ("--path-alone",), "to which belongs clamp, not nothing"),
+        (
+            JOB.replace('name = "panda"', 'name = "panda"\nreference = "panda_link0"', 1).replace(
+                "[workpiece]", '[workpiece]\non = "panda_link0"'
+            ),
+            (),
+            "the workpiece is on 'panda_link0'",
+        ),
+        (
+            JOB.replace(
+                'name = "panda"',
+                'name = "panda"\nreference = "panda_link0"\nbase = { position = [0, 0.1, 0] }',
+                1,
+            ),
+            (),
+            "no frame of the workpiece moves both alike",
+        ),
+    ],
+)
+def test_a_job_that_cannot_be_written_as_placed_is_refused_before(
+    tmp_path: Path, text: str, options: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "job.toml").write_text(text)
+    out = tmp_path / "there.toml"
+    asked = ("place", tmp_path / "job.toml", "--x", "-0.05,0.05", *options, "--out", out)
+    assert said in " ".join(complaint(*asked).split())
+    assert not out.exists()
 
 
 def test_directions_of_the_world_stay_where_the_base_is_tilted() -> None:

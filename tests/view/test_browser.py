@@ -190,6 +190,28 @@ def test_undo_goes_back(page: Any, server: Served) -> None:
     assert server.session.edited.document == before
 
 
+def test_what_is_refused_leaves_what_is_planned_to_be_shown(page: Any, server: Served) -> None:
+    page.evaluate("""() => {
+      replay.live.ask({ do: "slide", name: "duration", value: 4.5, final: true });
+      replay.live.ask({ do: "drag", name: "roof", matrix: [], final: true });
+    }""")
+    settled(page, server)
+    assert page.locator("html[data-live=verified]").count() == 1
+    assert "there is no 'roof'" in page.locator("#told.bad").inner_text()
+
+
+def test_a_page_loaded_anew_shows_what_is_planned(page: Any, server: Served) -> None:
+    page.evaluate("""() => {
+      replay.live.ask({ do: "slide", name: "duration", value: 4.0, final: true });
+      replay.live.changed = false;
+    }""")
+    page.reload()
+    page.wait_for_selector("html[data-live]", timeout=60_000)
+    settled(page, server)
+    assert page.locator("html[data-live=verified]").count() == 1
+    assert server.session.found.plan.trajectory.duration == 4.0
+
+
 def test_what_stops_it_is_said_and_red(page: Any, server: Served) -> None:
     page.evaluate("""() => {
       const { handles, ask } = replay.live;

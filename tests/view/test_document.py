@@ -91,5 +91,6 @@ def test_a_way_through_a_number_is_refused(edited):
         with pytest.raises(FileFormatError, match="expected a table or a list"):
             edited.change({keys: 1.0}, final=True)
     assert edited.document == before
+    assert not edited.can_undo
     assert at(before, ("costs", 0, "weight")) == 1.0
     assert at(before, ("costs", 3, "weight")) is None

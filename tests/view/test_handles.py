@@ -195,3 +195,25 @@ def test_sliders_are_what_the_document_says() -> None:
     for slider in found.values():
         assert slider.low <= slider.value <= slider.high
     assert "clearance" not in sliders_of({**given, "clearance": False}, given)
+
+
+def test_costs_of_one_kind_have_a_slider_each() -> None:
+    costs = [
+        {"kind": "JointVelocity", "weight": 2.0},
+        {"kind": "JointVelocity", "weight": 3.0, "name": "calm"},
+    ]
+    given = {**CASES["an obstacle"], "costs": costs}
+    found = sliders_of(given, given)
+    assert found["weight of JointVelocity"].keys == ("costs", 0, "weight")
+    assert found["weight of calm"].keys == ("costs", 1, "weight")
+
+
+@pytest.mark.parametrize("name", ["part", "base", "tool"])
+def test_a_body_that_is_called_as_another_handle_takes_none_away(name: str) -> None:
+    given = copy.deepcopy(CASES["a workpiece"])
+    given["workpiece"]["obstacles"][0]["name"] = name
+    found = handles_of(given, job_of(given).problem)
+    assert found[name].kind == name
+    body = found[f"obstacle {name}"]
+    assert (body.name, body.kind) == (f"obstacle {name}", "obstacle")
+    assert body.nodes == (f"/selfmotion/plan0/obstacles/{name}",)

@@ -1,9 +1,11 @@
 """The server: on this machine only, for who has the token, and for one tab."""
 
+import asyncio
 import json
 import subprocess
 import sys
 import urllib.error
+import urllib.parse
 import urllib.request
 
 import pytest
@@ -11,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from selfmotion.basics import RenderError
-from selfmotion.shell.view import check_server, listening
+from selfmotion.shell.view import application, check_server, listening
 from support.views import CIRCLE, TOKEN, served, told
 
 
@@ -56,6 +58,21 @@ def test_a_foreign_page_gets_nothing(server, host, origin):
     assert status == 403
     assert text.startswith("refused: ")
     assert len(text) < 200
+
+
+@pytest.mark.parametrize(("port", "status"), [(80, 200), (8080, 403)])
+def test_browsers_leave_out_the_port_of_http(server, port, status):
+    app = application(server.session, TOKEN, port)
+    found = []
+
+    async def send(message):
+        found.append(message)
+
+    headers = [(b"host", b"127.0.0.1"), (b"origin", b"http://127.0.0.1")]
+    query = f"token={TOKEN}".encode()
+    scope = {"type": "http", "method": "GET", "path": "/", "query_string": query}
+    asyncio.run(app({**scope, "headers": headers}, None, send))
+    assert found[0]["status"] == status
 
 
 def test_it_listens_on_this_machine_only():
@@ -103,7 +120,8 @@ def test_the_connection_is_for_who_has_the_token_and_for_one_tab(server):
 def test_what_is_no_json_is_answered_and_the_connection_stays(server):
     with live(server) as page:
         page.recv(60)
-        for text in ("{", "[]", "5", '{"do": "slide", "name": "duration", "value": NaN}'):
+        not_a_number = '{"do": "slide", "name": "duration", "value": NaN}'
+        for text in ("{", "[]", "5", "[" * 60_000, not_a_number):
             page.send(text)
             assert "error" in json.loads(page.recv(60))
         page.send(json.dumps({"do": "save"}))
@@ -114,7 +132,7 @@ def test_what_is_no_json_is_answered_and_the_connection_stays(server):
 def test_files_are_exported(server):
     status, headers, text = answer(server, f"/export?token={TOKEN}&as=.csv")
     assert status == 200
-    assert headers["content-disposition"] == 'attachment; filename="circle.csv"'
+    assert headers["content-disposition"] == "attachment; filename*=UTF-8''circle.csv"
     assert text.startswith("t,")
     status, _, text = answer(server, f"/export?token={TOKEN}&as=.exe")
     assert status == 409
@@ -144,3 +162,13 @@ def test_nobody_else_imports_the_server():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_files_with_any_name_are_exported(tmp_path):
+    file = tmp_path / 'löten "日本".toml'
+    file.write_text(CIRCLE)
+    with served(file) as named:
+        status, headers, _ = answer(named, f"/export?token={TOKEN}&as=.csv")
+    assert status == 200
+    name = headers["content-disposition"].removeprefix("attachment; filename*=UTF-8''")
+    assert urllib.parse.unquote(name) == 'löten "日本".csv'

@@ -119,6 +119,50 @@ def test_what_cannot_be_asked_is_refused_and_changes_nothing(page):
     assert page.session.edited.document == before
 
 
+def test_numbers_too_large_for_a_float_are_refused(page):
+    for asked, said in (
+        ({"do": "slide", "name": "duration", "value": 10**400}, "expected 0.5 to 32"),
+        ({"do": "drag", "name": "post", "matrix": [10**400] * 16}, "expected 16 numbers"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            page.session.answer(asked)
+
+
+def test_what_is_refused_is_answered_by_the_plan_of_what_is(page):
+    last(page)
+    page.session.answer({"do": "slide", "name": "duration", "value": 5.0, "mark": 1})
+    with pytest.raises(ProblemError):
+        page.session.answer({"do": "drag", "name": "roof", "mark": 2})
+    assert page.until(lambda found: found["kind"] == "whole" and not found["brief"])["answers"] == 2
+    with pytest.raises(ProblemError):
+        page.session.answer({"do": "drag", "name": "roof", "mark": 3})
+    assert page.until(lambda found: found["answers"] == 3)["kind"] == "whole"
+
+
+def test_a_page_that_comes_while_a_plan_is_made_is_told_that_it_is(tmp_path):
+    file = tmp_path / "circle.toml"
+    file.write_text(CIRCLE)
+    with opened(file) as session:
+        asked = {"do": "slide", "name": "duration", "value": 5.0, "final": True, "mark": 7}
+        Heard(session).session.answer(asked)
+        session.detach()
+        page = Heard(session)
+        page.answer(1)
+        # Whatever was shown of the document before answered nothing that this page asks.
+        assert {found["answers"] for found in page.messages if found["number"] == 0} <= {-1}
+        assert {found["answers"] for found in page.messages if found["number"] == 1} == {0}
+        numbers = [found["number"] for found in page.messages]
+        assert numbers == sorted(numbers)
+
+
+@pytest.mark.parametrize("said", ["costs = 5", "relaxations = [1]", 'constraints = ["x"]'])
+def test_a_file_that_is_no_problem_is_told_at_once(tmp_path, said):
+    file = tmp_path / "circle.toml"
+    file.write_text(f"{said}\n" + CIRCLE.replace("[[costs]]", "[other]"))
+    with pytest.raises((FileFormatError, ProblemError), match=said.split()[0]):
+        Session(file)
+
+
 def test_a_verified_plan_is_exported(page, tmp_path):
     last(page)
     for suffix in (".csv", ".npz", ".yaml"):

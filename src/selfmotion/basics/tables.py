@@ -356,7 +356,7 @@ def write_document(file: Path, document: Mapping[str, Any]) -> None:
         case ".toml":
             import tomli_w
 
-            text = tomli_w.dumps(document)
+            text = tomli_w.dumps(_without_null(document))
         case ".json":
             text = json.dumps(document, indent=1) + "\n"
         case ".yaml" | ".yml":
@@ -367,6 +367,13 @@ def write_document(file: Path, document: Mapping[str, Any]) -> None:
         case _:
             raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml or .json")
     write_text(file, text)
+
+
+def _without_null(value: Any) -> Any:
+    """Return a value as TOML can hold it: without keys of JSON's null, which count as absent."""
+    if isinstance(value, Mapping):
+        return {key: _without_null(item) for key, item in value.items() if item is not None}
+    return [_without_null(item) for item in value] if isinstance(value, list) else value
 
 
 def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:

@@ -68,10 +68,10 @@ def plan(
     outputs.print_notes(remarks)
     job.check_used(job.goal)
     if job.goal == "parts":
-        options.refuse({"from": warm, **given}, "a motion in parts", "its own")
+        options.refuse_unused({"from": warm, **given}, "a motion in parts")
         jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json, verbose)
     if job.goal == "fastest":
-        options.refuse({"from": warm, **given}, "the fastest motion", "its own")
+        options.refuse_unused({"from": warm, **given}, "the fastest motion")
         result = fastest_with_progress(job).plan
     elif job.goal == "retimed":
         found = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})

@@ -24,7 +24,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
-from selfmotion.shell.documents import belonging, moved_workpiece
+from selfmotion.shell.documents import SeamJob, belonging, moved_workpiece
 from selfmotion.work.batch import processes
 
 # The commands that say how wrong a cell may be.
@@ -310,6 +310,9 @@ def place(
         _check_placed_jobs(jobs[0], out or [], base)
     else:
         problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
+    if not (base or part or path_alone):
+        for file, document in zip(files, read, strict=True):
+            _check_stands(file, document)
     known_parts = [names for names in map(belonging, read) if names is not None]
     named = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
     within = {
@@ -324,6 +327,8 @@ def place(
         given["part"] = sorted({name for names in known_parts for name in names})
     if center is not None:
         given["center"] = options.numbers(center, "--center", 3)
+    if jobs and out:
+        _check_moved_bodies(jobs[0], read[0], job, given.get("part", ()))
     with ExitStack() as stack:
         display = stack.enter_context(StageDisplay(stages))
         if workers is not None:
@@ -332,7 +337,10 @@ def place(
     terminal.print(str(found), markup=False, soft_wrap=True)
     for file in out or []:
         if jobs:
-            write_document(file, moved_workpiece(read[0], found.displacement))
+            # Paths are in the frame of the reference, which need not be the world.
+            frame = problems[0].follows.items[0].chain.base_placement
+            by = frame.inverse() * found.displacement * frame
+            write_document(file, moved_workpiece(read[0], by))
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
         else:
             _write(found, file)
@@ -397,6 +405,38 @@ def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
                 f"{file}: expected a job file ({', '.join(_PROBLEM_SUFFIXES)}) beside {job}, whose "
                 f"files it names"
             )
+
+
+def _check_stands(file: Path, document: Mapping[str, Any]) -> None:
+    """Raise where bodies of a workpiece are not in the world, where places are."""
+    link = document["workpiece"].get("on") if belonging(document) else None
+    if link is not None:
+        raise sm.errors.ProblemError(
+            f"{file}: the workpiece is on '{link}', and its bodies with it; a part is placed in "
+            f"the world: leave out workpiece.on, or give --base"
+        )
+
+
+def _check_moved_bodies(
+    file: Path, document: Mapping[str, Any], job: SeamJob, part: Sequence[str]
+) -> None:
+    """Raise where moving its workpiece would not move what was placed of a job."""
+    own = belonging(document) or ()
+    if set(part) != set(own):
+        raise sm.errors.ProblemError(
+            f"{file}: a job is written at its place with its [workpiece] moved, to which belongs "
+            f"{', '.join(own) or 'no obstacle'}, not {', '.join(part) or 'nothing'}; have in "
+            f"workpiece.obstacles what moves along, or leave out --out"
+        )
+    frame = job.problems[0].follows.items[0].chain.base_placement
+    is_on = (document.get("workpiece") or {}).get("on") is not None
+    bodies = own or any(seam.leaves for seam in job.seams)
+    if bodies and not is_on and not frame.isIdentity(1e-9):
+        raise sm.errors.ProblemError(
+            f"{file}: paths are in the frame of '{job.robot.reference}', bodies of the workpiece "
+            f"in the world, so that no frame of the workpiece moves both alike; leave out "
+            f"robot.reference, or --out"
+        )
 
 
 def _write(found: sm.placement.Placement, file: Path) -> None:

@@ -466,6 +466,14 @@ def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
             raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
+def refuse_unused(given: dict[str, Any], what: str) -> None:
+    """Raise ProblemError for an option that has no effect on what is planned."""
+    for name, value in given.items():
+        if value is not None:
+            option = name.replace("_", "-")
+            raise sm.errors.ProblemError(f"--{option} has no effect on {what}: leave it out")
+
+
 def one_or_each(text: str, option: str) -> list[float] | float:
     """Return one number, or one for each joint."""
     found: list[float] = numbers(text, option).tolist()

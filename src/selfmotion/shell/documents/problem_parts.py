@@ -439,9 +439,10 @@ def belonging(document: Mapping[str, Any]) -> tuple[str, ...] | None:
 
 
 def moved_workpiece(document: Mapping[str, Any], by: SE3) -> dict[str, Any]:
-    """Return a document whose workpiece is moved in the world, with all that is in its frame.
+    """Return a document whose workpiece is moved, with all that is in its frame.
 
-    One without a workpiece gets one, in which its paths are.
+    By a rigid motion in the frame in which the workpiece stands. One without a workpiece gets one,
+    in which its paths are.
     """
     place = by * standing(document)[0]
     piece = dict(document.get(NAME, {}))

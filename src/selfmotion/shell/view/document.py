@@ -55,11 +55,11 @@ class Edited:
         FileFormatError
             A way leads through something that is no table and no list.
         """
-        if self._before is None:
-            self._before = deepcopy(self.document)
         changed = deepcopy(self.document)
         for keys, value in values.items():
             _set(changed, keys, deepcopy(value))
+        if self._before is None:
+            self._before = self.document
         self.document = changed
         if final:
             if self._before != self.document:

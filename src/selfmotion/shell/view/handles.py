@@ -1,7 +1,7 @@
 """What of a document can be dragged: the part, the arm's base, waypoints, obstacles, the tool."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,15 @@ def handles_of(document: Mapping[str, Any], problem: Problem) -> dict[str, Handl
         *_of_obstacles(document, problem),
         *_of_tool(document, problem.robot),
     ]
-    return {handle.name: handle for handle in found}
+    # A body may be called as anything else is, the part or the base.
+    taken = {handle.name for handle in found if handle.kind != "obstacle"}
+    named: dict[str, Handle] = {}
+    for handle in found:
+        name = handle.name
+        while handle.kind == "obstacle" and (name in taken or name in named):
+            name = f"obstacle {name}"
+        named[name] = replace(handle, name=name)
+    return named
 
 
 def dragged(document: Mapping[str, Any], handle: Handle, shown: SE3) -> dict[Keys, Any]:

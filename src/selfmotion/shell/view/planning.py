@@ -43,13 +43,10 @@ class Request:
     number : int
         Requests are counted; the last one counts.
     document : dict
-    mark : int
-        The number that the page gave what it asked for.
     """
 
     number: int
     document: Mapping[str, Any]
-    mark: int = 0
 
 
 @dataclass(frozen=True, eq=False)

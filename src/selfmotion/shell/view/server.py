@@ -8,6 +8,7 @@ import socket
 import webbrowser
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from selfmotion.basics import RenderError, SelfmotionError
 from selfmotion.shell.view.session import Session
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 # How a connection is ended: without the token, and where another tab has the page.
 REFUSED, TAKEN = 4403, 4409
+# The port that addresses without one have.
+_HTTP = 80
 # Messages of the page are short [bytes].
 _LONGEST = 65_536
 
@@ -118,7 +121,9 @@ def application(session: Session, token: str, port: int) -> "Starlette":
     from starlette.routing import Route, WebSocketRoute
 
     # Another name for this machine is one that a foreign page may have given it.
-    hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+    names = (HOST, "localhost")
+    # Browsers leave out the port of HTTP.
+    hosts = {f"{name}:{port}" for name in names} | set(names if port == _HTTP else ())
 
     def refusal(request: "Request | WebSocket") -> str:
         """Return why a request is refused; "" for none."""
@@ -145,8 +150,9 @@ def application(session: Session, token: str, port: int) -> "Starlette":
             data = await asyncio.to_thread(session.export, suffix)
         except SelfmotionError as error:
             return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
-        name = f"{session.edited.file.stem}{suffix}".replace('"', "")
-        headers = {**_HEADERS, "Content-Disposition": f'attachment; filename="{name}"'}
+        # Headers are Latin-1: other letters of the name are told as those of an address are.
+        name = quote(f"{session.edited.file.stem}{suffix}", safe="", errors="replace")
+        headers = {**_HEADERS, "Content-Disposition": f"attachment; filename*=UTF-8''{name}"}
         return Response(data, media_type="application/octet-stream", headers=headers)
 
     async def live(connection: "WebSocket") -> None:
@@ -210,7 +216,7 @@ async def _hear(connection: "WebSocket", session: Session) -> None:
         try:
             asked = json.loads(text)
             answer = await asyncio.to_thread(session.answer, asked)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             answer = {"error": f"the page sent what is no JSON: {error}"}
         except SelfmotionError as error:
             answer = {"error": str(error)}

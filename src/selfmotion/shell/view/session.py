@@ -2,14 +2,13 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 import numpy as np
 
-from selfmotion.basics import PlanError, ProblemError, shown as told
+from selfmotion.basics import PlanError, ProblemError, SelfmotionError, shown as told
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json
@@ -25,6 +24,8 @@ from selfmotion.shop.controllers import write_motion
 EXPORTS = (".npz", ".csv", ".json", ".yaml", ".xml", ".script", ".src", ".mod")
 # How far a matrix of the page may be from a pose.
 _RIGID = 1e-3
+# No page gives this number to what it asks.
+_NOTHING = -1
 
 
 class Session:
@@ -53,7 +54,7 @@ class Session:
         self._handles: dict[str, Handle] = {}
         self._sliders: dict[str, Slider] = {}
         self._send: Callable[[bytes], None] | None = None
-        self._lock = threading.RLock()
+        self._lock, self._telling = threading.RLock(), threading.Lock()
         self._planning = Planning(file, allow_code, self._take)
         plan = self._first_plan()
         self._sliders = sliders_of(self.edited.document, self._begun)
@@ -93,9 +94,6 @@ class Session:
             self._send = send
             # Another page counts anew.
             self._mark = 0
-            if self._found is not None:
-                request = replace(self._found.request, mark=0)
-                self._found = replace(self._found, request=request)
         self._tell()
         return True
 
@@ -117,23 +115,32 @@ class Session:
         mark = asked.get("mark", 0)
         if isinstance(mark, bool) or not isinstance(mark, int):
             raise ProblemError(f"mark: is {told(mark)}, expected a whole number")
-        with self._lock:
-            self._mark = mark
-            match asked.get("do"):
-                case "drag":
-                    self._drag(asked)
-                case "slide":
-                    self._slide(asked)
-                case "undo":
-                    self.edited.undo()
-                    self._ask()
-                case "save":
-                    self.edited.save()
-                    return {"saved": True, **self._state}
-                case other:
-                    raise ProblemError(
-                        f"the page asks for {told(other)}, expected drag, slide, undo or save"
-                    )
+        try:
+            with self._lock:
+                is_new, self._mark = mark != self._mark, mark
+                return self._done(asked)
+        except SelfmotionError:
+            # The plan of what was asked for before answers this, too.
+            if is_new:
+                self._tell()
+            raise
+
+    def _done(self, asked: Mapping[str, Any]) -> Json | None:
+        match asked.get("do"):
+            case "drag":
+                self._drag(asked)
+            case "slide":
+                self._slide(asked)
+            case "undo":
+                self.edited.undo()
+                self._ask()
+            case "save":
+                self.edited.save()
+                return {"saved": True, **self._state}
+            case other:
+                raise ProblemError(
+                    f"the page asks for {told(other)}, expected drag, slide, undo or save"
+                )
         return None
 
     def _drag(self, asked: Mapping[str, Any]) -> None:
@@ -153,7 +160,7 @@ class Session:
             raise ProblemError(f"{slider.name}: is {told(value)}, expected a number")
         if not slider.low <= value <= slider.high:
             raise ProblemError(
-                f"{slider.name}: is {value:g}, expected {slider.low:g} to {slider.high:g}"
+                f"{slider.name}: is {told(value)}, expected {slider.low:g} to {slider.high:g}"
             )
         self.edited.change({slider.keys: float(value)}, final=bool(asked.get("final")))
         self._ask()
@@ -192,7 +199,7 @@ class Session:
 
     def _ask(self) -> None:
         self._number += 1
-        self._planning.ask(Request(self._number, self.edited.document, self._mark))
+        self._planning.ask(Request(self._number, self.edited.document))
 
     @property
     def _state(self) -> Json:
@@ -214,18 +221,29 @@ class Session:
 
     def _tell(self) -> None:
         """Tell the page of what was found last."""
-        with self._lock:
-            found, send, state = self._found, self._send, self._state
-        # Without the lock: the page may go on to ask while this is made.
-        if found is not None and send is not None:
+        # One after the other, so that an older message never comes last.
+        with self._telling:
+            with self._lock:
+                found, send = self._found, self._send
+                if found is None or send is None:
+                    return
+                state = {**self._state, "answers": self._answered(found)}
+            # The page may go on to ask while this is made.
             send(self._shown.message(found, state))
+
+    def _answered(self, found: Found) -> int:
+        """Return the number of what a page asked that is answered; that of nothing for older ones.
+
+        The last document answers whatever was asked last, whichever page had asked for it.
+        """
+        return self._mark if found.request.number == self._number else _NOTHING
 
 
 def _pose(matrix: Any) -> SE3:
     """Return the pose of a matrix that the page sends, column by column."""
     try:
         values = np.array(matrix, dtype=np.float64).reshape(4, 4).T
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ProblemError(f"matrix: is {told(matrix)}, expected 16 numbers") from None
     turn = values[:3, :3]
     off = np.abs(turn @ turn.T - np.eye(3)).max()

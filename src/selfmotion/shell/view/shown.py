@@ -43,7 +43,6 @@ class Shown:
         payload = Payload()
         content: Json = {
             "number": found.request.number,
-            "answers": found.request.mark,
             "kind": found.kind,
             "words": found.words,
             "brief": found.is_brief,

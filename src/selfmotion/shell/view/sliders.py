@@ -78,8 +78,9 @@ def _sliders(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[
         for key, unit in (("band", ""), ("band_mm", "mm"), ("band_deg", "°")):
             yield from _about(document, begun, ("relaxations", k, key), name, unit)
     for k, item in enumerate(document.get("costs", [])):
+        name = f"weight of {item.get('name', item['kind'])}"
         for key in _WEIGHTS:
-            yield from _about(document, begun, ("costs", k, key), f"weight of {item['kind']}", "")
+            yield from _about(document, begun, ("costs", k, key), name, "")
 
 
 def _about(

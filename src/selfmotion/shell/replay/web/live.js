@@ -72,13 +72,10 @@ class Live {
     this.page.stage?.setGrey(true);
   }
 
-  // A short answer: what cannot be done, or that it is saved.
+  // A short answer: what cannot be done, or that it is saved. A plan of what is answers either.
   hear(answer) {
     if (answer.error) {
       this.say(answer.error, true);
-      // Nothing was changed: what is shown is still right.
-      this.asked = this.answered;
-      if (this.last) this.judge(this.last);
       return;
     }
     if (answer.saved) this.say("Saved.");
@@ -208,7 +205,7 @@ class Live {
       this.say(await answer.text(), true);
       return;
     }
-    const name = answer.headers.get("Content-Disposition").match(/filename="(.*)"/)[1];
+    const name = decodeURIComponent(answer.headers.get("Content-Disposition").split("UTF-8''")[1]);
     offer(await answer.blob(), name);
     this.say(`Exported ${name}.`);
   }
