@@ -26,37 +26,10 @@ from websockets.sync.client import ClientConnection, connect
 import selfmotion as sm
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from support.views import TOKEN, served, told
+from known import RAIL
 
-RAIL = """
-<robot name="rail">
-  <link name="rail"/>
-  <link name="carriage"/>
-  <joint name="slide" type="prismatic">
-    <parent link="rail"/> <child link="carriage"/> <axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" velocity="0.5" effort="2000"/>
-  </joint>
-</robot>"""
-PANDA = """
-task = "pointing"
-[robot]
-name = "panda"
-[path]
-kind = "circle"
-radius = 0.1
-duration = 4.0
-start = { position = [0.5, 0, 0.5], rpy_deg = [180, 0, 0] }
-[[costs]]
-kind = "JointVelocity"
-weight = 1.0
-[clearance]
-distance_mm = 5
-[[clearance.obstacles]]
-shape = "box"
-name = "post"
-position = [0.3, -0.6, 0.6]
-size = [0.1, 0.1, 1.2]
-"""
+from support.views import CIRCLE, TOKEN, served, told
+
 UR10_ON_A_RAIL = """
 task = "pose"
 [robot]
@@ -75,7 +48,7 @@ start = { position = [0.7, -0.4, 0.5], rpy_deg = [180, 0, 0] }
 kind = "JointVelocity"
 weight = 1.0
 """
-DOCUMENTS = {"Panda, circle": PANDA, "UR10 on a rail, line": UR10_ON_A_RAIL}
+DOCUMENTS = {"Panda, circle": CIRCLE, "UR10 on a rail, line": UR10_ON_A_RAIL}
 # A drag sends so many places before the last one, so far apart [s].
 PLACES, EVERY = 5, 1.0 / 30.0
 # How far it goes [m], and a slider, in shares of its range.

@@ -10,6 +10,7 @@ from selfmotion.basics import (
     Progress,
     as_called,
     as_choice,
+    as_number,
     as_whole,
     obey_interruption,
     random_numbers,
@@ -81,8 +82,10 @@ class Deadline(Counts):
 
     @classmethod
     def after(cls, seconds: float | None) -> "Deadline":
-        """Return the deadline in `seconds` from now; None for none."""
-        return cls() if seconds is None else cls(end=time.perf_counter() + seconds)
+        """Return the deadline in `seconds` from now, None for none; ProblemError for no time."""
+        if seconds is None:
+            return cls()
+        return cls(end=time.perf_counter() + as_number(seconds, "deadline", above=0.0))
 
     def evaluated(self) -> None:
         """See `Counts.evaluated`; KeyboardInterrupt where the deadline has passed."""

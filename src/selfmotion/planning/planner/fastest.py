@@ -231,8 +231,7 @@ def fastest(
     check_no_feed(problem)
     kept = _KeptCosts.of(problem, {} if keep is None else keep)
     limits = rate_limits(problem, acceleration, velocity)
-    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
-    clock = Deadline.after(seconds)
+    clock = Deadline.after(deadline)
     rounds = _Rounds(problem, limits, kept, search, tolerance, clock, progress)
     status = Status.CONVERGED
     try:

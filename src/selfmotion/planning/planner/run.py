@@ -11,7 +11,6 @@ from selfmotion.basics import (
     ProblemError,
     Progress,
     as_called,
-    as_number,
     as_whole,
     held_interruption,
     one_blas_thread,
@@ -249,8 +248,7 @@ def plan(
     if callback is not None:
         as_called(callback, "callback")
     check_feeds_of(problem)
-    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
-    clock = Deadline.after(seconds)
+    clock = Deadline.after(deadline)
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _DAMPED_EVALUATIONS
     effort = Effort(optimizer, callback, max_evaluations, clock)

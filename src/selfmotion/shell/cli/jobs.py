@@ -67,7 +67,9 @@ def job(
     ] = None,
     deadline: Annotated[
         float | None,
-        typer.Option(help="Stop after so many seconds by the clock; --folder keeps what is done."),
+        typer.Option(
+            help="Stop after this many seconds by the clock; --folder keeps what is done."
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     dask: Annotated[

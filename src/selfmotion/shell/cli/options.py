@@ -223,7 +223,7 @@ DampedOption = Annotated[
 ]
 DeadlineOption = Annotated[
     float | None,
-    typer.Option(help="Stop after so many seconds by the clock, with the best so far."),
+    typer.Option(help="Stop after this many seconds by the clock, with the best so far."),
 ]
 LimitOption = Annotated[
     int | None, typer.Option(help="Limit on cost evaluations while optimising.")

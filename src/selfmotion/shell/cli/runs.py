@@ -81,7 +81,7 @@ def batch(
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
     deadline: Annotated[
-        float | None, typer.Option(help="For each plan: stop after so many seconds by the clock.")
+        float | None, typer.Option(help="For each plan: stop after this many seconds by the clock.")
     ] = None,
     replays: Annotated[
         int, typer.Option(min=0, help="Write replays of so many of the best plans.")

@@ -334,6 +334,11 @@ def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ..
     apart = [item for item in asked if isinstance(item, Clearance)]
     path = _Performed(robot, motion)
     problem = Problem(robot, path, free[0], constraints=apart, rest=False)
+    return unproved(problem, motion)
+
+
+def unproved(problem: Problem, motion: Trajectory, words: str = "") -> Plan:
+    """Return a plan of a motion of which nothing is proved; its certificate says why in `words`."""
     nothing = Extreme(0.0, 0.0, "")
     certificate = Certificate(
         nothing,
@@ -343,11 +348,12 @@ def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ..
         0,
         Tolerance(),
         (),
-        (),
+        (words,) if words else (),
         motion=motion.digest,
         problem=problem.digest,
     )
-    report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), Status.CONVERGED, "", 0.0)
+    status = Status.INFEASIBLE if words else Status.CONVERGED
+    report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), status, words, 0.0)
     return Plan(problem, motion, motion, np.zeros(0), report, certificate)
 
 

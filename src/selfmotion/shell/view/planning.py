@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import ProblemError, SelfmotionError
-from selfmotion.certificate import Certificate, Extreme, Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.planning.optimise import Iteration, Status
+from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
-from selfmotion.planning.result import Plan, Report, retime
+from selfmotion.planning.result import Plan, retime
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import job_of
+from selfmotion.shell.replay.whole import unproved
 
 # Times of a coarse motion.
 _TIMES = 41
@@ -245,22 +245,3 @@ def standing(problem: Problem, last: Plan | None, words: str) -> Plan:
     still = np.tile(q, (2, 1))
     motion = Trajectory(np.array([0.0, duration]), still, np.zeros_like(still), robot.joint_names)
     return unproved(problem, motion, words)
-
-
-def unproved(problem: Problem, motion: Trajectory, words: str) -> Plan:
-    """Return a plan of a motion of which nothing is proved; its certificate says why."""
-    nothing = Extreme(0.0, 0.0, "")
-    certificate = Certificate(
-        nothing,
-        nothing,
-        nothing,
-        0.0,
-        0,
-        Tolerance(),
-        (),
-        (words,),
-        motion=motion.digest,
-        problem=problem.digest,
-    )
-    report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), Status.INFEASIBLE, words, 0.0)
-    return Plan(problem, motion, motion, np.zeros(0), report, certificate)

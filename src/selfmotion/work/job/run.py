@@ -279,7 +279,7 @@ def plan_job(
         as_whole(rng, "rng", 0, 2**63),
     )
     check_executor(executor)
-    clock = Deadline.after(None if deadline is None else as_number(deadline, "deadline", above=0.0))
+    clock = Deadline.after(deadline)
     told = clock.checked_by(obeying(progress))
     for seam in sorted(listed, key=_slowest):
         check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])

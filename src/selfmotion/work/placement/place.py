@@ -19,7 +19,6 @@ from selfmotion.basics import (
     Progress,
     as_called,
     as_choice,
-    as_number,
     as_numbers,
     as_several,
     check_executor,
@@ -113,7 +112,7 @@ def place(
     about = None if center is None else as_numbers(center, "place: center", "(3,) [m]", (3,))
     listed = None if part is None else _names(part)
     places = places_of(several, of, listed, about, names)
-    clock = Deadline.after(None if deadline is None else as_number(deadline, "deadline", above=0.0))
+    clock = Deadline.after(deadline)
     told = clock.checked_by(progress)
     run = _Here(places, box, told) if executor is None else _There(places, box, executor, told)
     # The present place is planned thoroughly: its cost is reported.
