@@ -125,7 +125,9 @@ def init(
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
     if MAYBE in text:
-        outputs.print_notes([f"links that overlap often are left out in {file}: {MAYBE}"])
+        pairs = [line[2:] for line in text.splitlines() if ": overlap in " in line]
+        listed = "; ".join(pairs)
+        outputs.print_notes([f"left out in {file}, as these links {MAYBE}: {listed}"])
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 

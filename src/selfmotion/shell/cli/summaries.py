@@ -154,7 +154,10 @@ def show_certificate(
         _print(console, told if name in nearest.name else f"{told} ({name})")
     count = len(certificate.remarks)
     if count:
-        _print(console, f"{count} remark{'s' * (count != 1)} on what was checked: {_MORE}")
+        # What was left out of a verdict is named beside it, in as many words as a line has.
+        heads = "; ".join(text.partition(": ")[0] for text in certificate.remarks)
+        several = f"{count} remark{'s' * (count != 1)}"
+        _print(console, f"{several} on what was checked ({heads}): {_MORE}")
 
 
 def show_program(program: Program, console: Console) -> None:

@@ -399,8 +399,9 @@ def _clearance(
         )
         said.append(f"disabled = [{listed}]")
         lines = [f"# {first} - {second}: {why}" for (first, second), why in pairs.items()]
-        made_so = "are made so" if share == ALWAYS else MAYBE
-        lines.insert(0, f"# Left out, as these links {made_so}:")
+        # An arm may be drawn in a pose in which it meets itself: only the user knows.
+        is_asked = all(pair in asked for pair in pairs)
+        lines.insert(0, f"# Left out, as {'asked' if is_asked else f'these links {MAYBE}'}:")
     return "\n".join([*lines, f"clearance = {{ {', '.join(said)} }}    # false: none"])
 
 
