@@ -203,12 +203,11 @@ def test_of_two_constraints_of_a_kind_both_are_judged(
 def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> None:
     path = short_line(panda, PANDA_HOME)
     box = sm.obstacles.Box("far", np.array([0.0, 0.0, 2.0]), [0.1, 0.1, 0.1])
-    constraints = (
-        *LIMITS,
-        sm.constraints.JointAccelerationLimits(20.0),
-        sm.constraints.Clearance((box,), 0.001),
+    constraints = (*LIMITS, sm.constraints.JointAccelerationLimits(20.0))
+    apart = sm.constraints.Clearance((box,), 0.001)
+    plan = sm.plan(
+        sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints, clearance=apart)
     )
-    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints))
     assert plan.certificate.verified
     plan.save(tmp_path / "plan.npz")
     loaded = sm.load_plan(tmp_path / "plan.npz")

@@ -10,6 +10,7 @@ from selfmotion.model.robot import ToolRates
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
+from selfmotion.problem.constraints import said_once
 from support.arms import PANDA_HOME
 from support.circles import small_circle
 from support.nodes import along, around_of, centred, moved, nodes_of, random_step
@@ -40,11 +41,9 @@ CONSTRAINTS = {
 
 def motion_with(panda: sm.RobotModel, name: str):
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    others, apart = said_once(CONSTRAINTS[name](), None)
     problem = sm.Problem(
-        *(panda, path, "position", PANDA_HOME),
-        constraints=CONSTRAINTS[name](),
-        rest=False,
-        clearance=None,
+        *(panda, path, "position", PANDA_HOME), constraints=others, rest=False, clearance=apart
     )
     motion = nodes_of(problem, 10)
     return centred(moved(motion, random_step(motion, 1, 0.02)))

@@ -23,7 +23,7 @@ def test_a_ball_behind_the_elbow_is_passed_on_the_other_side(panda: sm.RobotMode
     circle = sm.paths.Circle.around(panda.pose(start), 0.112, 4.0, normal=[-0.023, 0.138, -0.99])
     ball = sm.obstacles.Sphere("ball", [-0.363, 0.168, 0.281], 0.08)
     free = sm.Problem(panda, circle, start=start)
-    asked = replace(free, constraints=[*free.constraints, sm.constraints.Clearance((ball,))])
+    asked = replace(free, clearance=sm.constraints.Clearance((ball,)))
     assert sm.plan(asked).certificate.verified
     # Where nothing stands there, the arm does not give way.
     assert sm.obstacles.CollisionModel(panda, (ball,)).worst(sm.plan(free).trajectory.q).value < 0.0

@@ -88,6 +88,10 @@ class FeedError(PathError):
         self.time = time
 
 
+class FormerUseWarning(FutureWarning):
+    """Something was said in a way that goes with the next version; the text says the new one."""
+
+
 class ProblemError(SelfmotionError):
     """Robot, path, task and start do not fit together."""
 

@@ -128,8 +128,8 @@ def _resolved(
 
 
 def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
-    """Whether self-collision, under the default clearance, is the only violation."""
-    is_default = formulation.problem.own_collision is not None and len(certificate.failures) == 1
+    """Whether self-collision, which was not looked at before, is the only violation."""
+    is_default = formulation.no_overlap is not None and len(certificate.failures) == 1
     return is_default and not certificate.findings[-1].satisfied
 
 
@@ -140,8 +140,8 @@ def _rough(formulation: Formulation, judged: Judged) -> bool:
     is_default = {item.name for item in formulation.problem.requirements}
     # The arm's own limits always apply.
     is_default |= set(LIMIT_NAMES[:2])
-    if formulation.problem.own_collision is not None:
-        # The default clearance need not have been a constraint of the nodes.
+    if formulation.no_overlap is not None:
+        # It need not have been a constraint of the nodes.
         is_default.discard(formulation.problem.requirements[-1].name)
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.

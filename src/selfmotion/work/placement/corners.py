@@ -27,7 +27,6 @@ from selfmotion.basics import (
 )
 from selfmotion.model.path import spread_along
 from selfmotion.planning.result import Plan
-from selfmotion.problem.constraints import Clearance
 from selfmotion.work.placement.places import COORDINATES, Places, Tried, places_of
 
 # A motion is near another one while no joint is farther from it than this [rad or m].
@@ -190,11 +189,9 @@ def correction(
 
 
 def _standing(plan: Plan) -> tuple[str, ...]:
-    items = (*plan.problem.constraints, plan.problem.clearance)
     return tuple(
         body.name
-        for item in items
-        if isinstance(item, Clearance)
+        for item in plan.problem.clearances
         for body in item.obstacles
         if body.frame is None
     )
