@@ -14,6 +14,7 @@ from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper.objective import node_tangents
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of
@@ -67,7 +68,7 @@ def objective_with(
 
 def rows_of(objective: Objective, bound: sm.constraints.BoundConstraint, x: Array) -> Array:
     """Return the derivatives of all conditions at x, as programmes ask for them."""
-    motion = objective.node_tangents(x)
+    motion = node_tangents(objective, x)
     known = linearised(bound, objective.samples(x), motion)
     return known.picked(motion, np.arange(known.count))
 
@@ -95,7 +96,7 @@ def test_tangents_equal_central_differences(constraint: str) -> None:
     made = CONSTRAINTS[constraint](robot_named("panda"))
     objective, bound = objective_with(made, "panda", "pose")
     x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
-    tangents: NodeTangents = objective.node_tangents(x)
+    tangents: NodeTangents = node_tangents(objective, x)
     exact = bound.tangents(objective.samples(x), tangents)
     for i in (0, 1, objective.size - 1):
         ends = []
@@ -115,7 +116,7 @@ def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
     objective, bound = objective_with(made, "panda", "pose")
     rng = np.random.default_rng(4)
     x = 0.02 * rng.normal(size=objective.size)
-    tangents, samples = objective.node_tangents(x), objective.samples(x)
+    tangents, samples = node_tangents(objective, x), objective.samples(x)
     expected = bound.tangents(samples, tangents).reshape(-1, objective.size)
     rows = linearised(bound, samples, tangents)
     # All of one motion is computed once.

@@ -91,6 +91,9 @@ class FeedError(PathError):
 class FormerUseWarning(FutureWarning):
     """Something was said in a way that goes with the next version; the text says the new one."""
 
+    def __init__(self, message: str = "") -> None:
+        super().__init__(message)
+
 
 class ProblemError(SelfmotionError):
     """Robot, path, task and start do not fit together."""
