@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.nodes import Step, minimise
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.optimise import Status
@@ -193,7 +194,7 @@ def test_another_configuration_on_the_same_plane_is_none(planar: sm.RobotModel) 
     dwell = sm.paths.Dwell(planar.pose(start), 3.0)
     problem = sm.Problem(planar, dwell, "planar", start)
     asked = sm.constraints.EndConfiguration(curve[0]).conditions(problem.robot)
-    (end,) = Formulation.of(problem).bound(asked, start, start).ends
+    (end,) = bound_conditions(Formulation.of(problem), asked, start, start).ends
     away = (curve - curve[0]) @ end.null[:, 0]
     (others,) = np.nonzero(np.diff(np.sign(away[100:-100])))
     assert len(others)
@@ -228,7 +229,7 @@ def test_an_end_at_another_configuration_is_told(panda: sm.RobotModel) -> None:
     problem = circle(panda)
     end = np.array(PANDA_HOME)
     own = sm.constraints.EndConfiguration(end).conditions(problem.robot)
-    (asked,) = Formulation.of(problem).bound(own, end, end).ends
+    (asked,) = bound_conditions(Formulation.of(problem), own, end, end).ends
     away = 0.3 * problem.follows.jacobian(end)[0] / np.linalg.norm(problem.follows.jacobian(end)[0])
     nodes = np.tile(end, (4, 3, 1))
     assert NodeEnds([asked]).elsewhere(nodes) == {}

@@ -88,7 +88,7 @@ def test_the_widest_band_says_what_a_pose_may_be() -> None:
     formulation = Formulation.of(problem)
     admits = formulation.envelope.admits
     tilted = [robot.inverse_kinematics(pose * tilt(angle)) for angle in (0.1, 0.199, 0.21)]
-    q = formulation.completed(np.full(3, 3.0), np.array(tilted))
+    q = formulation.follows.completed(np.full(3, 3.0), np.array(tilted))
     assert admits(q).tolist() == [True, True, False]
 
 

@@ -68,7 +68,9 @@ def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotM
     )
     formulation = Formulation.of(problem)
     t = np.linspace(0.0, 4.0, 9)
-    motions, arrived = carried(formulation.follows, formulation.completed(t[:1], start[None]), t)
+    motions, arrived = carried(
+        formulation.follows, formulation.follows.completed(t[:1], start[None]), t
+    )
     assert arrived.all()
     found = shortest_along(formulation, t, motions[0], t, (1.0, 0.3))
     assert found is not None

@@ -41,7 +41,7 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
 
 
 def _all_of(formulation: Formulation, q: Array) -> Array:
-    return np.asarray(formulation.completed(np.zeros(1), q[None])[0])
+    return np.asarray(formulation.follows.completed(np.zeros(1), q[None])[0])
 
 
 def moved(motion: NodeMotion, step: Array) -> NodeMotion:

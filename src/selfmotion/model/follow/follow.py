@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, shown
 from selfmotion.basics.layout import Layout, layout_of
-from selfmotion.model.follow.coordinates import Coordinates
+from selfmotion.model.follow.coordinates import Coordinates, generic_values
 from selfmotion.model.path import Dwell, Path, PathSamples, twist_rates
 from selfmotion.model.robot import Chain, RobotModel, null_space
 from selfmotion.model.robot.tree_arrays import JOINT
@@ -257,7 +257,7 @@ class Follows:
     @cached_property
     def redundancy(self) -> int:
         """Number n - m of directions of self-motion at generic configurations."""
-        jacobians = [self.jacobian(q) for q in self.coordinates.generic()]
+        jacobians = [self.jacobian(q) for q in generic_values(self.coordinates)]
         return self.dof - max(map(_rank, jacobians))
 
     @cached_property

@@ -67,16 +67,7 @@ class RelaxedFrames(Follows):
 
     @override
     def completed(self, t: Array, q: Array) -> Array:
-        return self.completed_along(self.items[0].path, t, q)
-
-    def completed_along(self, path: Path, t: Array, q: Array) -> Array:
-        """Return q (K, n) with the virtual joints that lead to a path at its times t (K,)."""
-        _, turns, places = self.robot.chain.along(q)
-        wanted = path.samples(np.minimum(t, path.duration))
-        found = self.virtual.coordinates((turns, places), (wanted.rotation, wanted.translation))
-        held = self.virtual.held(t * (self.duration / path.duration))
-        found[held] = 0.0
-        return np.hstack([q, found])
+        return completed_along(self, self.items[0].path, t, q)
 
     @property
     @override
@@ -91,10 +82,6 @@ class RelaxedFrames(Follows):
             )
 
         return replace(self, items=tuple(shut(item) for item in self.items))
-
-    def deviation(self, item: Relaxation, q: Array) -> Array:
-        """Return the deviations of a relaxation's rows at q (K, n), (K, k) [m, rad]."""
-        return self.virtual.rows_of(item, q[:, self.robot.dof :])[0]
 
     def limits_within(self, item: Relaxation, band: float = np.inf) -> Array:
         """Return limits of |q| (n,) beyond which a relaxation's rows are off their path too far.
@@ -119,7 +106,7 @@ class RelaxedFrames(Follows):
             band = self.virtual.widest(item.indices)
             if len(item.rows) == 1 or not np.isfinite(band):
                 continue
-            size = np.linalg.norm(self.deviation(item, q), axis=1)
+            size = np.linalg.norm(deviation_of(self, item, q), axis=1)
             beyond = size > band
             share = _INSIDE * band / np.where(beyond, size, 1.0)
             for k, joint in enumerate(self.virtual.each, first):
@@ -154,6 +141,21 @@ class RelaxedFrames(Follows):
     def edges(self) -> tuple[float, ...]:
         ends = {x for item in self.virtual.relaxations for x in item.window(self.duration)}
         return tuple(sorted(ends - {0.0, self.duration}))
+
+
+def completed_along(follows: RelaxedFrames, path: Path, t: Array, q: Array) -> Array:
+    """Return q (K, n) with the virtual joints that lead to a path at its times t (K,)."""
+    _, turns, places = follows.robot.chain.along(q)
+    wanted = path.samples(np.minimum(t, path.duration))
+    found = follows.virtual.coordinates((turns, places), (wanted.rotation, wanted.translation))
+    held = follows.virtual.held(t * (follows.duration / path.duration))
+    found[held] = 0.0
+    return np.hstack([q, found])
+
+
+def deviation_of(follows: RelaxedFrames, item: Relaxation, q: Array) -> Array:
+    """Return the deviations of a relaxation's rows at q (K, n), (K, k) [m, rad]."""
+    return follows.virtual.rows_of(item, q[:, follows.robot.dof :])[0]
 
 
 class _Alike:

@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Column, Quantity
-from selfmotion.model.follow import RelaxedFrames, VirtualJoints
+from selfmotion.model.follow import RelaxedFrames, VirtualJoints, joint_of
 from selfmotion.model.task import ROW_NAMES, Relaxation
 from selfmotion.problem.constraints import (
     BoundConstraint,
@@ -103,7 +103,7 @@ class RowWithinBand(BoundLimits):
 
         None where no joint's coordinate is its deviation, or that has other bands in other windows.
         """
-        joint = follows.virtual.joint_of(item)
+        joint = joint_of(follows.virtual, item)
         shared = [each for each in follows.virtual.relaxations if item.indices[0] in each.indices]
         if joint is None or len(shared) > 1:
             return None
@@ -134,7 +134,7 @@ class RowWithinBand(BoundLimits):
         """
         bounds = follows.limits_within(item)[follows.robot.dof :]
         joints = np.flatnonzero(np.isfinite(bounds))
-        if follows.virtual.joint_of(item) is not None or not joints.size:
+        if joint_of(follows.virtual, item) is not None or not joints.size:
             return None
         each = follows.virtual.each
         rows = [cast(int, each[k].row) for k in joints]

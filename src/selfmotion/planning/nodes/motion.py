@@ -12,6 +12,7 @@ from selfmotion.planning.formulation import (
     CurveSamples,
     Formulation,
     SampledMotion,
+    sampled,
 )
 from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
@@ -245,7 +246,7 @@ class NodeMotion:
         """The motion at the Gauss points."""
         grid = self.grid
         every = CurveSamples(grid.manifolds.follows, grid.spline.sampling, partial(_at_gauss, self))
-        return grid.formulation.sampled(every)
+        return sampled(grid.formulation, every)
 
     @cached_property
     def checked(self) -> SampledMotion:
@@ -253,7 +254,7 @@ class NodeMotion:
         grid = self.grid
         at = partial(grid.spline.at_points, ends=self.curve_ends)
         every = CurveSamples(grid.manifolds.follows, grid.spline.points, at)
-        return grid.formulation.sampled(every)
+        return sampled(grid.formulation, every)
 
     @cached_property
     def terms(self) -> dict[str, float]:

@@ -72,7 +72,7 @@ def smoothing_of(
 
 def rest_times(formulation: Formulation) -> Array:
     """Return the ends at which the arm rests, (k,) [s]."""
-    both = zip(formulation.problem.rests, (0.0, formulation.path.duration), strict=True)
+    both = zip(formulation.problem.rest_orders, (0.0, formulation.path.duration), strict=True)
     return np.array([end for rest, end in both if rest])
 
 
@@ -81,7 +81,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
 
     The present share `quick`, unless its penalty is too large.
     """
-    if _is_smooth(formulation) or not any(formulation.problem.rests):
+    if _is_smooth(formulation) or not any(formulation.problem.rest_orders):
         return quick
     shares = _of_rest(formulation, samples.sampling.t, quick)
     squares = shares * (samples.qdd**2 @ _weights(formulation))

@@ -272,7 +272,8 @@ def null_motion_table(
 
 def _brought_to_rest(formulation: Formulation, t: Array, epsilon: Array) -> Array:
     """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-    fading = fading_window(t, formulation.path.duration, formulation.problem.rests)
+    start, end = formulation.problem.rest_orders
+    fading = fading_window(t, formulation.path.duration, (start > 0, end > 0))
     return epsilon * fading[:, None]
 
 

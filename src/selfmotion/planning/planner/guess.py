@@ -7,7 +7,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, InverseKinematicsError, ProblemError, shown
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.formulation import BoundConditions, Formulation
+from selfmotion.planning.formulation import BoundConditions, Formulation, with_windows_shut
 from selfmotion.planning.paper import Guide, MinimumNormMotion, converged_minimum_norm
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, most_nodes
@@ -190,7 +190,7 @@ def _begun(
     It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
     cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
     """
-    shut = formulation.with_windows_shut
+    shut = with_windows_shut(formulation)
     try:
         return converged_minimum_norm(shut, start, guide, grid)
     except BreakdownError:

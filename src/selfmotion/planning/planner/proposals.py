@@ -26,7 +26,7 @@ from selfmotion.basics import (
 )
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import Formulation, without_tolerances
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, broken_intervals
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
@@ -48,7 +48,7 @@ from selfmotion.planning.search import (
     shortest_along,
     start_candidates,
 )
-from selfmotion.problem.problem import constraints_of_part
+from selfmotion.problem.problem import along_other_paths, constraints_of_part
 
 # Length of a long path, in reaches of the arm: x = 0 starts to drift.
 LONG_PATH = 5.0
@@ -215,12 +215,12 @@ def _starts(planner: Planner, count: int) -> list[Array]:
     """Return `count` starts: on the path itself, or as near to it as tolerances allow."""
     formulation = planner.formulation
     try:
-        found = _drawn(formulation.without_tolerances, planner, count)
+        found = _drawn(without_tolerances(formulation), planner, count)
     except InverseKinematicsError:
         if not formulation.problem.relaxations:
             raise
         return _drawn(formulation, planner, count)
-    return list(formulation.completed(np.zeros(len(found)), np.array(found)))
+    return list(formulation.follows.completed(np.zeros(len(found)), np.array(found)))
 
 
 def _drawn(
@@ -443,13 +443,14 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     formulation = planner.formulation
     middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / formulation.length_in_reaches
     first, last = (formulation.path.duration * share for share in (middle - half, middle + half))
-    section = formulation.changed(
-        **formulation.along(lambda path: Section(path, first, last)),
+    problem = formulation.problem
+    section = problem.changed(
+        **along_other_paths(problem, lambda path: Section(path, first, last)),
         start=None,
-        constraints=list(constraints_of_part(formulation.problem, is_first=False, is_last=False)),
+        constraints=list(constraints_of_part(problem, is_first=False, is_last=False)),
         rest=False,
     )
-    own = replace(planner.setup, formulation=section)
+    own = replace(planner.setup, formulation=Formulation.of(section))
     inner = replace(
         planner,
         setup=own,

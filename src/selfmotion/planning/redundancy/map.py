@@ -226,7 +226,7 @@ def redundancy_map_of(
     """
     columns, rows = _shape(shape)
     times = np.linspace(float(motion.t[0]), float(motion.t[-1]), columns)
-    z = formulation.completed(times, motion(times))
+    z = formulation.follows.completed(times, motion(times))
     axis = axis_of(formulation, times, z, coordinate)
     line = _line(formulation, axis, motion, times)
     start = _line(formulation, axis, initial, times)
@@ -283,7 +283,7 @@ def _line(formulation: Formulation, axis: Axis, motion: Trajectory, times: Array
         return line
     fine = np.interp(np.arange(_BETWEEN * (len(few) - 1) + 1) / _BETWEEN, np.arange(len(few)), few)
     fine = np.minimum(fine, motion.t[-1])
-    z = formulation.completed(fine, motion(fine))
+    z = formulation.follows.completed(fine, motion(fine))
     line[inside] = axis.along(formulation.follows, fine, z)[::_BETWEEN]
     return line
 

@@ -41,6 +41,7 @@ from selfmotion.planning.result.specification import (
 from selfmotion.problem.problem import (
     START_TOLERANCE,
     Problem,
+    along_other_paths,
     at_all_times,
     constraints_of_part,
     problem_from_dict,
@@ -362,7 +363,7 @@ class PartsAsked:
                 yield f"it is not the path from {ends[0]:.6g} to {ends[1]:.6g} s"
                 return
             if isinstance(path, Retimed):
-                moved = problem.along(lambda _: path, times_along(path, ends))
+                moved = along_other_paths(problem, lambda _: path, times_along(path, ends))
                 relaxed = moved["relaxations"]
             else:
                 relaxed = tuple(problem.relaxations)

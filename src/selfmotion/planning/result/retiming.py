@@ -33,7 +33,7 @@ from selfmotion.problem.constraints import (
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, along_other_paths
 
 # Times between two samples of the new motion [s]: the first one within the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
@@ -297,7 +297,8 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
     asked = [item for item in old.constraints if not (plan.report.ending and item.ends.is_about(1))]
     problem = replace(
         old,
-        **old.along(
+        **along_other_paths(
+            old,
             lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend),
             passed,
         ),

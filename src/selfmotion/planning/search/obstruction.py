@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import Closest, how_near
-from selfmotion.model.follow import RelaxedFrames
+from selfmotion.model.follow import RelaxedFrames, deviation_of
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.planning.formulation import Formulation
@@ -124,7 +124,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         q = q[wider.bounds.keep(q)]
         if not len(q):
             break
-        away = follows.deviation(more, q)
+        away = deviation_of(follows, more, q)
         sizes = np.linalg.norm(away, axis=1)
         order = np.argsort(sizes)
         q, size = q[order], float(sizes[order[0]])

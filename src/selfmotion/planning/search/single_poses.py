@@ -210,7 +210,7 @@ def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
 
 
 def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
-    """Return samples of all poses-motions of a pose, where these are curves, (K, n).
+    """Return samples of all self-motions of a pose, where these are curves, (K, n).
 
     Those within the limits: the curves go on beyond them.
     """
@@ -228,7 +228,7 @@ def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
 
 
 def _wandered(poses: SinglePoses, t: float, met: Array) -> Array:
-    """Return configurations that random walks along the poses-motions lead to, (K, n).
+    """Return configurations that random walks along the self-motions lead to, (K, n).
 
     From anywhere Newton's method may lead to few of them only, where limits are near.
     """
