@@ -395,8 +395,8 @@ def forget(motion: NodeMotion) -> None:
 
 def on_grid(motion: NodeMotion, grid: NodeGrid) -> "NodeMotion | None":
     """Return the motion on other nodes."""
-    own = motion.trajectory
-    q, qd, qdd = (own(grid.t, order) for order in range(3))
+    curve = motion.trajectory
+    q, qd, qdd = (curve(grid.t, order) for order in range(3))
     # Approximate bases suffice as a start, and rotate like the ones around.
     last = np.searchsorted(motion.grid.t, grid.t, side="right") - 1
     return grid.around(Charts(grid.manifolds, q, motion.charts.bases[last]), qd, qdd)

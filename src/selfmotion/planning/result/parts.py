@@ -372,7 +372,7 @@ class PartsAsked:
             path, relaxed = problem.path, tuple(problem.relaxations)
             constraints = tuple(problem.constraints)
         wanted = (*constraints, *problem.clearances)
-        asked = MotionSpecification(
+        required = MotionSpecification(
             problem.robot,
             path,
             problem.task,
@@ -382,7 +382,7 @@ class PartsAsked:
             also=problem.also,
             rest=problem.rest and problem.damping is None,
         )
-        yield from asked.failures(plan)
+        yield from required.failures(plan)
         start = problem.given_start
         if is_first and start is not None:
             # The correction of a start given near the path.
@@ -397,8 +397,8 @@ class PartsAsked:
         if len(moves) != wanted:
             yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"
             return
-        asked = (*at_all_times(problem.constraints), *problem.clearances)
-        kept = [item for item in asked if item.applies(problem.robot)]
+        wanted = (*at_all_times(problem.constraints), *problem.clearances)
+        kept = [item for item in wanted if item.applies(problem.robot)]
         for number, move in enumerate(moves, 1):
             for text in another_tool(move.robot, problem.robot):
                 yield f"move {number}: {text}"

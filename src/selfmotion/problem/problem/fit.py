@@ -109,10 +109,10 @@ def _beyond(robot: RobotModel, start: Array) -> str:
     for k, name in enumerate(robot.joint_names):
         low, high = robot.lower[k], robot.upper[k]
         if not low <= start[k] <= high:
-            unit, asked = ("m", "") if robot.is_prismatic(name) else ("rad", "; in degrees?")
+            unit, hint = ("m", "") if robot.is_prismatic(name) else ("rad", "; in degrees?")
             return (
                 f"has joint '{name}' at {start[k]:g} {unit}, beyond its limits of {low:.4g} to "
-                f"{high:.4g} {unit}{asked}, and "
+                f"{high:.4g} {unit}{hint}, and "
             )
     return ""
 

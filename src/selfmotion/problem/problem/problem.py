@@ -246,8 +246,8 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        asked = self.envelope
-        limits = BeyondLimits(_BEYOND_LIMITS, asked.lower, asked.upper, asked.speed)
+        kept = self.envelope
+        limits = BeyondLimits(_BEYOND_LIMITS, kept.lower, kept.upper, kept.speed)
         return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
     @property
