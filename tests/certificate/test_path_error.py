@@ -23,6 +23,7 @@ from selfmotion.certificate.path_error import (
     rotation_vectors,
 )
 from selfmotion.model.follow import Follows
+from selfmotion.model.follow.follow import only_tip
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.formulation.formulation import path_errors
 from support.arms import robot_named
@@ -32,7 +33,7 @@ ROUNDING = 1e-12
 
 
 def errors_of(path: sm.paths.Path, task: sm.Task, robot: sm.RobotModel, *given: Any) -> PathCheck:
-    return bound_errors(robot, Follows.of(robot, path, task).only, *given)
+    return bound_errors(robot, only_tip(Follows.of(robot, path, task)), *given)
 
 
 def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:

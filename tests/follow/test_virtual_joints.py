@@ -10,8 +10,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.certificate.path_error import deviation_from
-from selfmotion.model.follow import Follows, RelaxedFrames
-from selfmotion.model.follow.relaxed import deviation_of
+from selfmotion.model.follow import Follows, with_tolerances
+from selfmotion.model.follow.relaxed import band_limits, deviation_of, has_windows, window_edges
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import (
     BoundConditions,
@@ -71,7 +71,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
 ) -> None:
     robot, rng = robot_named(name), np.random.default_rng(1)
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), task)
-    follows = RelaxedFrames.with_tolerances(real, relaxations)
+    follows = with_tolerances(real, relaxations)
     virtual, n = follows.virtual, robot.dof
     lower, upper = robot.finite_limits()
     for _ in range(3):
@@ -106,14 +106,14 @@ def test_joints_stand_still_outside_of_windows() -> None:
     robot = robot_named("panda")
     path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
-    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, "pose"), windows)
+    follows = with_tolerances(Follows.of(robot, path, "pose"), windows)
     names = follows.coordinates.names[7:]
     held = follows.held(np.array([0.0, 1.0, 1.5, 2.0, 4.0]))[:, 7:]
     told = [{name for name, still in zip(names, row, strict=True) if still} for row in held]
     tilt = {"tilt rx", "tilt ry"}
     assert told == [tilt, tilt, set(), {"relaxed x"}, {"relaxed x"}]
-    assert follows.holds
-    assert follows.edges == (1.0, 2.0)
+    assert has_windows(follows)
+    assert window_edges(follows) == (1.0, 2.0)
 
 
 def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:
@@ -201,7 +201,7 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
     path = sm.paths.Dwell(robot.pose(start), 4.0)
     problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None)
     formulation = Formulation.of(problem)
-    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, task), relaxations)
+    follows = with_tolerances(Follows.of(robot, path, task), relaxations)
     virtual, n = follows.virtual, robot.dof
     sampling = Sampling.trapezoidal(np.linspace(0.0, 4.0, 5))
     said = 0
@@ -322,7 +322,7 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     """Of tolerances of several rows; what is within them may stay where it is."""
     robot = robot_named("panda")
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
-    follows = RelaxedFrames.with_tolerances(real, relaxations)
+    follows = with_tolerances(real, relaxations)
     count = len(follows.virtual.each)
     q = np.zeros((40, robot.dof + count))
     bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]
@@ -331,7 +331,7 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     if follows.virtual.swing is not None:
         first, second = follows.virtual.swing
         q[:, robot.dof + second] = q[:, robot.dof + first]
-    most = follows.within_bands(q)
+    most = band_limits(follows, q)
     there = np.clip(q, -most, most)
     for item in relaxations:
         if len(item.rows) == 1 or not np.isfinite(item.band):

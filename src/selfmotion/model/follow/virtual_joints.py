@@ -434,3 +434,7 @@ def _angles(cosine: Array, sine: Array) -> tuple[Array, Array]:
         (angle * cosine - sine) / safe**3,
     )
     return size, slope
+
+
+# Those of a path without tolerances.
+NO_VIRTUAL_JOINTS = VirtualJoints(Task.POSE, (), 1.0, 1.0)

@@ -10,7 +10,16 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate import Certificate, Tolerance, arm_limits, errors_between
-from selfmotion.model.follow import Coordinates, Follows, RelaxedFrames, completed_along
+from selfmotion.model.follow import (
+    Coordinates,
+    Follows,
+    completed,
+    completed_along,
+    has_windows,
+    null_basis_at,
+    windows_shut,
+    with_tolerances,
+)
 from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
@@ -90,7 +99,7 @@ class Formulation:
         """Return a problem's: its tolerances are virtual joints."""
         if not problem.relaxations:
             return on_path(problem)
-        follows = RelaxedFrames.with_tolerances(problem.follows, problem.relaxations)
+        follows = with_tolerances(problem.follows, problem.relaxations)
         return replace(on_path(problem), follows=follows)
 
     @property
@@ -115,7 +124,7 @@ class Formulation:
         return (
             None
             if start is None
-            else read_only(self.follows.completed(np.zeros(1), start[None])[0])
+            else read_only(completed(self.follows, np.zeros(1), start[None])[0])
         )
 
     @cached_property
@@ -141,7 +150,7 @@ class Formulation:
         problem = self.problem
         own = _conditions(self, apart=apart, decomposed=decomposed)
         bound = bound_conditions(self, own, start, end)
-        if not isinstance(self.follows, RelaxedFrames):
+        if not self.follows.virtual.each:
             return bound
         ends = list(bound.ends)
         bands = band_conditions(self.follows, problem.relaxations)
@@ -200,9 +209,9 @@ def with_springs(formulation: Formulation, cost: float) -> Formulation:
 
 def with_windows_shut(formulation: Formulation) -> Formulation:
     """Return the same where motions without self-motion make no use of tolerances in windows."""
-    if not formulation.follows.holds:
+    if not has_windows(formulation.follows):
         return formulation
-    return replace(formulation, follows=formulation.follows.with_windows_shut)
+    return replace(formulation, follows=windows_shut(formulation.follows))
 
 
 def arm_motion(formulation: Formulation, trajectory: Trajectory) -> Trajectory:
@@ -223,7 +232,7 @@ def motion_of_all(formulation: Formulation, trajectory: Trajectory, path: Path) 
     """Return the motion of all coordinates for one of the arm along a path like this one's."""
     from scipy.interpolate import CubicSpline
 
-    if not isinstance(formulation.follows, RelaxedFrames):
+    if not formulation.follows.virtual.each:
         return trajectory
     t = trajectory.t
     q = completed_along(formulation.follows, path, t, trajectory.q)
@@ -308,16 +317,16 @@ def _end(formulation: Formulation, item: EndCondition, start: Array, end: Array)
     target = item.target
     if target is not None and 0 in item.orders:
         time = 0.0 if item.at_start else formulation.path.duration
-        at = target = formulation.follows.completed(np.array([time]), target[None])[0]
+        at = target = completed(formulation.follows, np.array([time]), target[None])[0]
     elif target is not None:
         target = np.append(target, np.zeros(formulation.follows.dof - len(target)))
-    return BoundEnd.of(item, target, formulation.follows.null_basis(at))
+    return BoundEnd.of(item, target, null_basis_at(formulation.follows, at))
 
 
 def _with_virtual(formulation: Formulation, own: Envelope) -> Envelope:
     """Return an arm's envelope with that of its virtual joints; bodies are the arm's."""
     follows, n = formulation.follows, formulation.robot.dof
-    if not isinstance(follows, RelaxedFrames):
+    if not follows.virtual.each:
         return own
     virtual = Coordinates.of(formulation.robot, follows.virtual)
     free = np.full(virtual.dof - n, np.inf)
@@ -362,7 +371,7 @@ def path_errors(formulation: Formulation, trajectory: Trajectory) -> Array:
     return np.asarray(np.max(found, axis=0))
 
 
-def _on_path_at_end(follows: RelaxedFrames) -> BoundEnd:
+def _on_path_at_end(follows: Follows) -> BoundEnd:
     """Return that virtual joints end at 0 where the tool is on the path itself."""
     at_zero = follows.robot.dof + np.flatnonzero(follows.virtual.at_zero)
     null = np.eye(follows.dof)[:, at_zero]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.model.follow import window_edges
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.spline import Quintic
 from selfmotion.problem.costs import JointVelocity, Samples
@@ -115,7 +116,7 @@ def _of_held(formulation: Formulation, t: Array) -> tuple[Array, Array]:
     """
     starting = _STARTING * formulation.path.duration
     faded = np.zeros_like(t)
-    for edge in formulation.follows.edges:
+    for edge in window_edges(formulation.follows):
         faded = np.maximum(faded, _faded(t - edge, starting))
     return starting**2 * faded, starting**4 * faded
 

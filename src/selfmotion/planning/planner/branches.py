@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Progress, SelfmotionError, presses, silent
+from selfmotion.model.follow import within_limits
 from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Search
@@ -132,7 +133,7 @@ def _room(problem: Problem) -> Room:
 def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     """Return allowed starts, each as far as any from those before, the first in the middle."""
     allowed = problem.envelope
-    follows = problem.follows.within(allowed.lower, allowed.upper)
+    follows = within_limits(problem.follows, allowed.lower, allowed.upper)
     own, room = follows.coordinates, _room(problem)
     try:
         starts = np.array(start_candidates(follows, Search().starts, rng, room.free))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, InverseKinematicsError, ProblemError, shown
+from selfmotion.model.follow import is_plain
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.formulation import BoundConditions, Formulation, with_windows_shut
@@ -43,7 +44,7 @@ def on_start(formulation: Formulation, seed: Array) -> Array:
     """
     follows, robot = formulation.follows, formulation.robot
     own = follows.coordinates
-    if not follows.is_plain:
+    if not is_plain(follows):
         manifold = Manifold(follows, own.lower, own.upper)
         held = follows.held(np.zeros(1))
         q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, RedundancyError
+from selfmotion.model.follow import completed, null_basis_at
 from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
 from selfmotion.planning.formulation import Formulation, keeps_off_itself, with_windows_shut
@@ -223,7 +224,7 @@ def _until(formulation: Formulation, time: float) -> Formulation:
 def _start_of(part: Formulation, formulation: Formulation, q: Array) -> Array:
     """Return a start (n,) of a problem as one of its part, which may have fewer joints."""
     own = q[None, : formulation.robot.dof]
-    return np.asarray(part.follows.completed(np.zeros(1), own)[0])
+    return np.asarray(completed(part.follows, np.zeros(1), own)[0])
 
 
 def _start_guess_of(part: Formulation, failed: _Attempt) -> _StartGuess:
@@ -293,7 +294,7 @@ class _Push:
 
 def _pushes(formulation: Formulation, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may stay in a plane without a continuation."""
-    basis = formulation.follows.null_basis(start) / formulation.path.duration
+    basis = null_basis_at(formulation.follows, start) / formulation.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 

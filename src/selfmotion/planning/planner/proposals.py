@@ -24,6 +24,7 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
+from selfmotion.model.follow import completed, within_limits
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
 from selfmotion.planning.formulation import Formulation, without_tolerances
@@ -190,7 +191,7 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
     places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
     found = dict[int, Array]()
     allowed = formulation.envelope
-    arm = formulation.follows.within(allowed.lower, allowed.upper)
+    arm = within_limits(formulation.follows, allowed.lower, allowed.upper)
     for place in sorted(places):
         with contextlib.suppress(InverseKinematicsError):
             # Few random ones satisfy all conditions: they are moved there.
@@ -220,7 +221,7 @@ def _starts(planner: Planner, count: int) -> list[Array]:
         if not formulation.problem.relaxations:
             raise
         return _drawn(formulation, planner, count)
-    return list(formulation.follows.completed(np.zeros(len(found)), np.array(found)))
+    return list(completed(formulation.follows, np.zeros(len(found)), np.array(found)))
 
 
 def _drawn(
@@ -228,7 +229,7 @@ def _drawn(
 ) -> list[Array]:
     """Return `count` configurations on the path at a time [s]."""
     allowed = formulation.envelope
-    follows = formulation.follows.within(allowed.lower, allowed.upper)
+    follows = within_limits(formulation.follows, allowed.lower, allowed.upper)
     admits = allowed.admits if allowed.quantities else None
     return start_candidates(follows, count, planner.rng, admits, time)
 

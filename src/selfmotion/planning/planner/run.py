@@ -20,6 +20,7 @@ from selfmotion.basics import (
     was_interrupted,
 )
 from selfmotion.certificate import Certificate, Tolerance
+from selfmotion.model.follow import completed
 from selfmotion.planning.formulation import Formulation, arm_motion, motion_of_all
 from selfmotion.planning.optimise import Callback, Optimizer, Status
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
@@ -286,7 +287,7 @@ def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress
     clock = Deadline()
     effort = Effort(None, None, None, clock)
     formulation = Formulation.of(problem)
-    guide = replace(guide, q=formulation.follows.completed(guide.t, guide.q))
+    guide = replace(guide, q=completed(formulation.follows, guide.t, guide.q))
     planner = Planner(Setup(formulation, Search(), tolerance, progress, guide=guide), effort)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)

@@ -397,8 +397,8 @@ class PartsAsked:
         if len(moves) != wanted:
             yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"
             return
-        wanted = (*at_all_times(problem.constraints), *problem.clearances)
-        kept = [item for item in wanted if item.applies(problem.robot)]
+        required = (*at_all_times(problem.constraints), *problem.clearances)
+        kept = [item for item in required if item.applies(problem.robot)]
         for number, move in enumerate(moves, 1):
             for text in another_tool(move.robot, problem.robot):
                 yield f"move {number}: {text}"

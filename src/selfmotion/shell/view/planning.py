@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import ProblemError, SelfmotionError
+from selfmotion.model.follow import is_plain
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
@@ -185,7 +186,7 @@ class Planning:
         last, robot = self.last, problem.robot
         if last is None or last.robot.joint_names != robot.joint_names:
             return None
-        if not problem.follows.is_plain:
+        if not is_plain(problem.follows):
             return None
         return coarse(problem, last.trajectory)
 
