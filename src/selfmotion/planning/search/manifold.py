@@ -235,7 +235,7 @@ class Manifold:
     ----------
     revolute : (n,)
     chains : (F, c + 1, 6, 3)
-        See `Follows.chains`.
+        See `chain_tables`.
     layout : (1, 9 + n)
         See `Follows.layout`.
 
