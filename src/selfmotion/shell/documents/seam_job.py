@@ -177,9 +177,16 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
 
 
 def seam_job_of(
-    document: Mapping[str, Any], file: FilePath, *, allow_code: bool = False
+    document: Mapping[str, Any],
+    file: FilePath,
+    *,
+    allow_code: bool = False,
+    memory: dict[str, Any] | None = None,
 ) -> SeamJob:
-    """Return the job that a document of a file describes. See `read_seam_job`."""
+    """Return the job that a document of a file describes. See `read_seam_job`.
+
+    Where many documents are read, those with the same arm share it by `memory`.
+    """
     given, settings = document.get("seams"), document.get("job", {})
     if isinstance(given, dict) and given.get("feed") == HIGHEST:
         return _at_highest(document, given, file, allow_code=allow_code)
@@ -202,7 +209,7 @@ def seam_job_of(
             )
     if not isinstance(shared.get(NAME, {}), Mapping):
         raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
-    reader = _Reader(file, shared, allow_code, {})
+    reader = _Reader(file, shared, allow_code, {} if memory is None else memory)
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first

@@ -212,7 +212,7 @@ class Whole:
         else:
             constraints, known = made.constraints, list(made.obstacles)
         unique = {item.name: item for item in known}
-        plan = _stand_in(made.robot, motion, constraints)
+        plan = stand_in(made.robot, motion, constraints)
         standing = tuple(unique.values())
         return cls(plan, marks, made.verdict, made.verified, events, standing, grows)
 
@@ -325,7 +325,7 @@ class _Performed(Path, kind="_performed"):
         return PathSamples(t, places, turns, twists)
 
 
-def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...]) -> Plan:
+def stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...]) -> Plan:
     """Return a plan with a motion, for what pages do with plans."""
     tasks = [task for task in (Task.POSITION, Task.PLANAR) if robot.can_follow(task)]
     free = [task for task in tasks if robot.redundancy(task) > 0]
