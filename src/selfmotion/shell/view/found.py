@@ -6,6 +6,7 @@ from typing import Any
 
 from selfmotion.model.path import Path
 from selfmotion.planning.result import Parts, Plan
+from selfmotion.shell.replay.redundancy import SeamMaps
 from selfmotion.shell.replay.whole import Whole
 from selfmotion.work.job import Program
 
@@ -45,6 +46,8 @@ class Found:
         What that is of: a job's program, or a motion in parts.
     unmade : tuple of Path
         Of a job the paths of the seams that are not made.
+    maps : tuple of SeamMaps
+        Redundancy maps, when they are made.
     is_brief : bool
         Whether there is more to tell of it, which takes longer: distances, the redundancy map.
     """
@@ -56,6 +59,7 @@ class Found:
     whole: Whole | None = None
     made: Program | Parts | None = None
     unmade: tuple[Path, ...] = ()
+    maps: tuple[SeamMaps, ...] = ()
     is_brief: bool = True
 
     @property

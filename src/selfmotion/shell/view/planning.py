@@ -20,6 +20,7 @@ from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.found import Found, NewerRequest, Request
+from selfmotion.shell.view.maps import maps_soon
 from selfmotion.shell.view.motions import (
     coarse,
     coarse_program,
@@ -48,8 +49,8 @@ class Planning:
         Whether code that documents name is run.
     tell : callable
         Called in that thread with each `Found`.
-    given : Plan, optional
-        A plan that is there already: of the first document that is asked for.
+    given : (dict, Plan), optional
+        A document, and its plan that is there already.
     """
 
     def __init__(
@@ -57,21 +58,22 @@ class Planning:
         file: Path,
         allow_code: bool,
         tell: Callable[[Found], None],
-        given: Plan | None = None,
+        given: tuple[Mapping[str, Any], Plan] | None = None,
     ) -> None:
         self._file, self._allow_code, self._tell = file, allow_code, tell
         self._wanted: Request | None = None
         self._change = threading.Condition()
         self._closed = False
         self._memory: dict[str, Any] = {}
-        self._has_begun = False
-        self._given: tuple[Mapping[str, Any], Plan] | None = None
-        self.last = given
+        self._given = given
+        self._first: Found | None = None
+        self.last: Plan | None = None
         self.last_program: Program | None = None
         self._thread = threading.Thread(target=self._run, name="planning", daemon=True)
 
-    def start(self) -> None:
-        """Begin to plan what is asked for."""
+    def start(self, first: Found | None = None) -> None:
+        """Begin to plan what is asked for, and to find more of what was found first."""
+        self._first = first
         self._thread.start()
 
     def ask(self, request: Request) -> None:
@@ -89,6 +91,9 @@ class Planning:
 
     def _run(self) -> None:
         done = -1
+        if self._first is not None:
+            done = self._first.request.number
+            self._tried(self._first.request, self._first)
         while True:
             with self._change:
                 while not self._closed and (self._wanted is None or self._wanted.number == done):
@@ -97,30 +102,42 @@ class Planning:
                     return
                 request = self._wanted
             done = request.number
-            try:
-                self.answer(request)
-            except NewerRequest:
-                continue
-            except Exception as error:
-                # A fault of the program ends this plan, not the page.
-                traceback.print_exc()
-                words = f"selfmotion failed, which is a fault of the program: {error}"
-                self._tell(Found(request, "none", words, None))
+            self._tried(request)
 
-    def answer(self, request: Request) -> None:
-        """Tell of the motions that are found for a request."""
+    def _tried(self, request: Request, found: Found | None = None) -> None:
+        """Answer a request, where that is not `found` yet, and find more of it."""
+        try:
+            found = found or self.answer(request)
+            self._more(found)
+        except NewerRequest:
+            return
+        except Exception as error:
+            # A fault of the program ends this plan, not the page.
+            traceback.print_exc()
+            words = f"selfmotion failed, which is a fault of the program: {error}"
+            self._tell(Found(request, "none", words, None))
+
+    def answer(self, request: Request) -> Found:
+        """Tell of the motions that are found for a request; return the last one."""
         if len(self._memory) > _KEPT:
             self._memory.clear()
-        if self.last is not None and not self._has_begun:
-            self._given = request.document, self.last
-        self._has_begun = True
         answers = self._programs if is_job(request.document) else self._plans
-        found = None
+        found = Found(request, "none", "", None)
         for found in answers(request):
             self._tell(found)
             self._leave(request)
-        if found is not None and found.kind == "whole" and self._is_calm(request):
-            self._tell(replace(found, is_brief=False))
+        return found
+
+    def _more(self, found: Found) -> None:
+        """Tell what takes longer, where nothing newer is asked for."""
+        if found.kind != "whole" or not self._is_calm(found.request):
+            return
+        found = replace(found, is_brief=False)
+        self._tell(found)
+        maps = tuple(maps_soon(found, self._stage(found.request)))
+        if maps:
+            self._leave(found.request)
+            self._tell(replace(found, maps=maps))
 
     def _plans(self, request: Request) -> Iterator[Found]:
         """Yield what is found for a problem."""
@@ -201,8 +218,7 @@ class Planning:
     def _is_calm(self, request: Request) -> bool:
         """Wait a moment; return whether nothing newer is asked for by then."""
         with self._change:
-            if self._thread.is_alive():
-                self._change.wait(_CALM)
+            self._change.wait(_CALM)
         return not self._closed and (self._wanted is None or self._wanted.number == request.number)
 
     def _coarse(self, problem: Problem) -> Plan | None:

@@ -53,15 +53,15 @@ class Session(Sitting):
         self._known: Plan | None = None
         self._handles: dict[str, Handle] = {}
         self._sliders: dict[str, Slider] = {}
-        given = self.edited.plan if isinstance(self.edited, EditedPlan) else None
+        given = None
+        if isinstance(self.edited, EditedPlan):
+            given = self.edited.document, self.edited.plan
         self._planning = Planning(file, allow_code, self._take, given)
         # Before there is a page; what is no problem at all is told at once.
-        self._planning.answer(Request(0, self.edited.document))
-        if self._found is None:
-            raise ProblemError(f"{file}: there is nothing to plan")
-        self.open(self._found)
+        first = self._planning.answer(Request(0, self.edited.document))
+        self.open(first)
         self._sliders = sliders_of(self.edited.document, self._begun)
-        self._planning.start()
+        self._planning.start(first)
 
     @property
     @override

@@ -56,6 +56,7 @@ class Shown:
                 triads=_TRIADS if found.whole is None else 0,
                 whole=found.whole,
                 brief=found.is_brief,
+                maps=found.maps,
             )
             if found.kind != "coarse" and not found.verified:
                 content["stopped"] = list(stopping(found, payload, self._radius))

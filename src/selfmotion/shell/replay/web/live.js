@@ -111,6 +111,7 @@ class Live {
     }
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
+    if (brief) get("maps").classList.add("stale");
     document.documentElement.dataset.brief = brief;
     this.judge(message);
   }
@@ -135,8 +136,8 @@ class Live {
     get("figures").replaceChildren();
     for (const { label, cells: [[value, note]] } of rows) {
       element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
-      const cell = element(get("figures"), "dd", {}, value);
-      if (note) element(cell, "small", {}, ` ${note}`);
+      // Where and when is in the table below: here the numbers leave room for the map.
+      element(get("figures"), "dd", note ? { title: note } : {}, value);
     }
   }
 
