@@ -7,6 +7,7 @@ from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid
 from selfmotion.planning.nodes.local_model import LocalModel
+from selfmotion.planning.nodes.motion import broken_intervals, forget, moved_along, stepped
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
@@ -29,14 +30,14 @@ def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
         return [
             motion.h,
             motion.checked.arm.qdd,
-            motion.samples.qddd,
+            motion.sampled.arm.qddd,
             motion.curve_ends,
             np.array([motion.cost, motion.objective, motion.violation]),
-            motion.broken_intervals(),
+            broken_intervals(motion),
         ]
 
     before = known()
-    motion.forget()
+    forget(motion)
     assert not {*motion.__dict__} & {"h", "partials", "checked", "samples", "curve_ends"}
     for again, once in zip(known(), before, strict=True):
         np.testing.assert_array_equal(again, once)
@@ -85,7 +86,7 @@ def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray,
     def jerks(nodes: np.ndarray) -> np.ndarray:
         return grid.spline.at(AT_CONTROLS, 3, grid.spline.ends(nodes))
 
-    found = motion.along(step, changes), motion.stepped(step)
+    found = moved_along(motion, step, changes), stepped(motion, step)
     assert found[0] is not None
     assert found[1] is not None
     assert grid.formulation.errors_between(found[0].trajectory).max() < ON_PATH

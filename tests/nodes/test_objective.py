@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.robot import has_masses
+from selfmotion.planning.nodes.motion import on_grid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
 from support.arms import Case
@@ -27,7 +28,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
 
 def force_of(motion):
     """Return λ = ∂F/∂(q, q̇, q̈) of the nodes."""
-    slopes = motion.grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+    slopes = motion.grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
     return motion.grid.spline.scattered(slopes)
 
 
@@ -40,7 +41,7 @@ def matrix_of(motion) -> Banded:
     around = around_of(motion, force_of(motion))
     by = motion.grid.spline.changes(around.changes)
     curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
-    motion.grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+    motion.grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
     matrix = curvature.banded()
     matrix.add(0, 0, around.curvature)
     return matrix
@@ -101,7 +102,7 @@ def test_what_is_minimised_besides_is_no_cost(case: Case) -> None:
     # At rest, starts and stops count; elsewhere nothing does unless the motion is to be calm.
     assert resting.objective > resting.cost
     assert motion.objective == motion.cost
-    smoothed = motion.on(motion.grid.on(motion.grid.t, smoothed=True))
+    smoothed = on_grid(motion, motion.grid.on(motion.grid.t, smoothed=True))
     assert smoothed is not None
     assert smoothed.cost < smoothed.objective < 1.01 * smoothed.cost
 

@@ -8,8 +8,11 @@ from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
+from selfmotion.planning.nodes.motion import on_grid, subdivisions
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
-from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
+from selfmotion.planning.nodes.rows import carried
+from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, control_times, unit_bases
+from selfmotion.problem.constraints import said_once
 from support.arms import PANDA_HOME
 from support.circles import small_circle
 from support.nodes import along, around_of, centred, moved, nodes_of, random_step
@@ -40,11 +43,9 @@ CONSTRAINTS = {
 
 def motion_with(panda: sm.RobotModel, name: str):
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    others, apart = said_once(CONSTRAINTS[name](), None)
     problem = sm.Problem(
-        *(panda, path, "position", PANDA_HOME),
-        constraints=CONSTRAINTS[name](),
-        rest=False,
-        clearance=None,
+        *(panda, path, "position", PANDA_HOME), constraints=others, rest=False, clearance=apart
     )
     motion = nodes_of(problem, 10)
     return centred(moved(motion, random_step(motion, 1, 0.02)))
@@ -112,7 +113,9 @@ def test_the_pieces_are_those_of_the_trajectory(panda: sm.RobotModel) -> None:
     """What is optimised is what the certificate judges."""
     motion = motion_with(panda, "two")
     t = motion.grid.spline.sampling.t
-    for order, values in enumerate((motion.samples.q, motion.samples.qd, motion.samples.qdd)):
+    for order, values in enumerate(
+        (motion.sampled.arm.q, motion.sampled.arm.qd, motion.sampled.arm.qdd)
+    ):
         expected = motion.trajectory(t, order)
         np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
 
@@ -122,16 +125,16 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
     motion = motion_with(panda, "tool")
     limits = motion_with(panda, "rates")
     for one in (motion, limits):
-        finer = one.on(one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
+        finer = on_grid(one, one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
         assert finer is not None
         multipliers = np.where(one.h > -500.0, 1.0, 0.0)
-        carried = finer.grid.rows.carried(one.grid.rows, multipliers)
-        assert carried.shape == finer.h.shape
-        carried[finer.h <= -500.0] = 0.0
+        known = carried(finer.grid.rows, one.grid.rows, multipliers)
+        assert known.shape == finer.h.shape
+        known[finer.h <= -500.0] = 0.0
         # Of each kind of row, per time.
         parts = (
             rows.split(each)
-            for rows, each in ((finer.grid.rows, carried), (one.grid.rows, multipliers))
+            for rows, each in ((finer.grid.rows, known), (one.grid.rows, multipliers))
         )
         for mine, theirs in zip(*parts, strict=True):
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)
@@ -152,7 +155,7 @@ def test_intervals_are_divided_where_something_is_beyond_between_points(
     limit = 0.7 * float(turn_rates(free.trajectory, whole).max())
     asked = sm.constraints.ToolLimits(turn_rate=limit)
     motion = nodes_of(small_circle(panda, task="position", constraints=[asked]))
-    parts = motion.subdivisions()
+    parts = subdivisions(motion)
     t = motion.grid.t
     looks = np.linspace(t[:-1], t[1:], 8, endpoint=False, axis=1)
     most = turn_rates(motion.trajectory, looks.ravel()).reshape(looks.shape).max(axis=1)
@@ -204,7 +207,7 @@ def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
 def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel) -> None:
     """Not where only a control point is near: in shares of what each limit is."""
     motion = motion_with(panda, "positions")
-    q, times = motion.trajectory, motion.grid.spline.times_of(0)
+    q, times = motion.trajectory, control_times(motion.grid.spline, 0)
     once = np.unique(times)
     lower, upper = panda.finite_limits()
     # As near to a limit as the curve comes, and as far as it is half of that.

@@ -61,7 +61,7 @@ def test_a_wait_after_a_line_costs_nothing() -> None:
 
 def test_what_starts_too_slowly_for_its_cost_is_quicker(case: Case) -> None:
     motion = nodes_of(problem_of(case, rest=True))
-    problem, samples, cost = motion.grid.formulation, motion.samples, motion.cost
+    problem, samples, cost = motion.grid.formulation, motion.sampled.arm, motion.cost
     assert quickness(problem, samples, 1e3 * cost, 1.0) == 1.0
     much = quickness(problem, samples, 1e-3 * cost, 1.0)
     more = quickness(problem, samples, 1e-4 * cost, 1.0)

@@ -14,6 +14,8 @@ from selfmotion.planning.nodes.spline import (
     ORDERS,
     POINTS,
     Quintic,
+    control_times,
+    point_shares,
     unit_bases,
 )
 
@@ -50,7 +52,7 @@ def test_the_curve_goes_through_its_nodes_as_a_quintic(order: int, shares: Array
     expected = curve(spline.points.t)
     near(spline.at_points(order, ends), expected)
     which = np.array([len(expected) - 1, 3, 0, 4])
-    k, tables = spline.point_shares(which)
+    k, tables = point_shares(spline, which)
     near((tables[:, order, None] @ ends[k])[:, 0], expected[which])
     with pytest.raises(AssertionError):
         near((tables[:, order, None] @ ends[k[::-1]])[:, 0], expected[which])
@@ -68,7 +70,7 @@ def test_control_points_are_those_of_bernstein(order: int) -> None:
     rising = np.stack([power.deriv(k)(T) if k else power(T) for k in range(3)], axis=1)
     near(
         spline.at(AT_CONTROLS, order, spline.ends(rising[:, :, None]))[..., 0],
-        spline.times_of(order),
+        control_times(spline, order),
     )
 
 
