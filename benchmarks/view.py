@@ -10,6 +10,7 @@ held against `plan()` of the file as it was saved.
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 import time
 from dataclasses import dataclass, field
@@ -48,7 +49,15 @@ start = { position = [0.7, -0.4, 0.5], rpy_deg = [180, 0, 0] }
 kind = "JointVelocity"
 weight = 1.0
 """
-DOCUMENTS = {"Panda, circle": CIRCLE, "UR10 on a rail, line": UR10_ON_A_RAIL}
+# Four sides of a frame, from home and back; where and how fast they are is what changes.
+FRAME = Path(__file__).parents[1] / "examples" / "frame.toml"
+DOCUMENTS = {
+    "Panda, circle": CIRCLE,
+    "UR10 on a rail, line": UR10_ON_A_RAIL,
+    "Panda, job of four seams": FRAME.read_text(),
+}
+# What is a verdict: of a job first that of the program in the order before.
+VERDICTS, LAST = ("early", "whole", "none"), ("whole", "none")
 # A drag sends so many places before the last one, so far apart [s].
 PLACES, EVERY = 5, 1.0 / 30.0
 # How far it goes [m], and a slider, in shares of its range.
@@ -61,14 +70,16 @@ class Times:
 
     Attributes
     ----------
-    first, verdict : list of float
-        Until a first motion, from a change; until the verdict, from the release.
+    first, verdict, last : list of float
+        Until a first motion, from a change; until the verdict, from the release; until the last
+        word on it, which of a job is the best order.
     verified : int
         Of how many releases the plan was verified.
     """
 
     first: list[float] = field(default_factory=list)
     verdict: list[float] = field(default_factory=list)
+    last: list[float] = field(default_factory=list)
     verified: int = 0
 
 
@@ -99,13 +110,16 @@ def moved(page: Page, changes: list[dict[str, Any]], times: Times) -> None:
     for change in changes:
         began = time.perf_counter()
         mark = page.ask(**change, final=False)
-        page.until(mark, ("coarse", "whole", "none"))
+        page.until(mark, ("coarse", *VERDICTS))
         times.first.append(time.perf_counter() - began)
         time.sleep(max(0.0, EVERY - (time.perf_counter() - began)))
     began = time.perf_counter()
     mark = page.ask(**changes[-1], final=True)
-    found = page.until(mark, ("whole", "none"))
+    found = page.until(mark, VERDICTS)
     times.verdict.append(time.perf_counter() - began)
+    if found["kind"] not in LAST:
+        found = page.until(mark, LAST)
+    times.last.append(time.perf_counter() - began)
     times.verified += found["kind"] == "whole" and found["plans"][0]["verified"]
 
 
@@ -134,6 +148,7 @@ def measured(text: str, repeats: int) -> tuple[Times, bool]:
     times = Times()
     with TemporaryDirectory() as folder:
         (Path(folder) / "rail.urdf").write_text(RAIL)
+        shutil.copy(FRAME.with_name("seams.csv"), folder)
         file = Path(folder) / "problem.toml"
         file.write_text(text)
         with (
@@ -152,23 +167,34 @@ def measured(text: str, repeats: int) -> tuple[Times, bool]:
                 for name in sliders:
                     moved(page, slides(page, name, way), times)
             server.session.answer({"do": "save"})
-            shown = server.session.found.plan
-            job = sm.files.read_job(file)
-            plan = sm.plan(job.problem, **job.settings)
-            return times, bool(np.array_equal(shown.trajectory.q, plan.trajectory.q))
+            return times, is_that_of_the_file(server.session.found, file)
+
+
+def is_that_of_the_file(found: Any, file: Path) -> bool:
+    """Return whether what is shown is what is planned of a file, bit for bit."""
+    if found.made is not None:
+        again = sm.files.read_seam_job(file).plan()
+        return bool(np.array_equal(found.made.trajectory.q, again.trajectory.q))
+    job = sm.files.read_job(file)
+    plan = sm.plan(job.problem, **job.settings)
+    return bool(np.array_equal(found.plan.trajectory.q, plan.trajectory.q))
 
 
 def main(
     repeats: Annotated[int, typer.Option(help="Drags of each handle and slider.")] = 10,
+    only: Annotated[str, typer.Option(help="Begin of a document's name; default: all.")] = "",
 ) -> None:
-    table = Table("", "first motion, p50", "p95", "verdict, p50", "p95", "verified", "plan()")
+    heads = ("first motion, p50", "p95", "verdict, p50", "p95", "last word, p50", "p95")
+    table = Table("", *heads, "verified", "plan()")
     sound = True
     for name, text in DOCUMENTS.items():
+        if not name.startswith(only):
+            continue
         times, same = measured(text, repeats)
         sound &= same
         row = [
             f"{1e3 * np.percentile(each, share):.0f} ms"
-            for each in (times.first, times.verdict)
+            for each in (times.first, times.verdict, times.last)
             for share in (50, 95)
         ]
         count = f"{times.verified} of {len(times.verdict)}"

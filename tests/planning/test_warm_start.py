@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.planner.guess import lasting
 from support.arms import PANDA_HOME
 from support.shell import invoke
 
@@ -167,3 +168,13 @@ def test_a_motion_that_keeps_the_limits_is_not_given_up_for_one_that_costs_less(
     found = sm.plan(problem, warm_start=replace(there, trajectory=back))
     assert found.certificate.verified, found.certificate.verdict
     assert found.report.cost <= there.report.cost * (1.0 + 1e-3)
+
+
+def test_a_motion_that_is_as_fast_as_another_path_ends_when_that_does() -> None:
+    """Exactly: of one duration in ten the rounded one is another number."""
+    rng = np.random.default_rng(0)
+    for own, asked in rng.uniform(0.1, 5.0, (200, 2)):
+        still = np.zeros((5, 1))
+        found = lasting(sm.Trajectory(np.linspace(0.0, own, 5), still, still, ("a",)), asked)
+        assert found.t[-1] == asked
+        assert np.all(np.diff(found.t) > 0.0)

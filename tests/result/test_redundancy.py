@@ -13,7 +13,7 @@ from selfmotion.problem.constraints import NO_OVERLAP
 from selfmotion.result import Reason, RedundancyMap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.redundancy_laws import faults
-from support.redundancy_oracle import Bodies, Coordinate, Oracle
+from support.redundancy_oracle import Bodies, Coordinate, Oracle, differs
 
 # Pixels of the maps here: enough to have every border of regions, and few enough to solve them all
 # by linear programmes and distances.
@@ -176,10 +176,10 @@ def test_a_panda_is_as_brute_force_has_it():
     own = plan.trajectory(shown.times)
     oracle = Oracle(plan.problem, shown, own, model.obstacles, model.pairs, required)
     columns = [4, 13]
-    assert not oracle.differs(columns).any()
+    found, _ = oracle.states(columns)
+    assert not differs(shown.state[columns], found).any()
     # The brute force sees what is shifted by a pixel.
-    state = np.roll(shown.state, 1, axis=1)
-    broken = replace(oracle, shown=replace(shown, state=state)).differs(columns)
+    broken = differs(np.roll(shown.state, 1, axis=1)[columns], found)
     assert broken.mean() > 0.005
 
 
@@ -307,3 +307,51 @@ def test_a_picture_is_drawn(tmp_path):
     axes = shown.figure().axes[0]
     assert axes.get_ylabel() == "swivel angle [°]"
     assert len(axes.lines) == 2
+
+
+def with_active(plan, *active):
+    return replace(plan, report=replace(plan.report, active=tuple(active)))
+
+
+def active(easing, saving=1.0):
+    name = "asked"
+    return sm.constraints.ActiveConstraint(name, easing, saving, ((0.0, 10.0),))
+
+
+def test_slices_are_first_along_what_keeps_the_plan_from_a_lower_cost():
+    """By multipliers: a joint that is at its limit, then what moves two bodies apart."""
+    plan = plan_of("panda", "pointing")
+    assert plan.redundancy_coordinates()[0] == "tool"
+    assert plan.redundancy_map(shape=(3, 3)).label == "rotation of the tool about its axis"
+    at_limits = with_active(
+        plan,
+        active("0.01 rad more at the upper limit of joint 'panda_joint4'", 1.0),
+        active("2 % more speed for joint 'panda_joint2'", 3.0),
+    )
+    names = at_limits.redundancy_coordinates()
+    assert names[:3] == ("panda_joint2", "panda_joint4", "tool")
+    assert set(names) == {"tool", *plan.robot.joint_names}
+    assert at_limits.redundancy_map(shape=(3, 3)).label == "joint 'panda_joint2'"
+    near = with_active(plan, active("1 mm less between 'panda_link0' and 'panda_hand'"))
+    assert near.redundancy_coordinates()[0] in plan.robot.joint_names
+
+
+def test_one_degree_of_redundancy_has_one_coordinate():
+    assert circle().redundancy_coordinates() == ("elbow",)
+
+
+def test_a_map_may_be_left_between_its_times():
+    class Enough(Exception):
+        pass
+
+    told = []
+
+    def leave(stage, number, count):
+        told.append((stage, number, count))
+        raise Enough
+
+    with pytest.raises(Enough):
+        circle().redundancy_map(shape=(121, 121), progress=leave)
+    ((stage, number, count),) = told
+    assert (stage, count) == ("redundancy map", 121)
+    assert 0 < number < count

@@ -12,7 +12,13 @@ from typing import Any
 
 import uvicorn
 
-from selfmotion.shell.view import Session, application, configuration, listening
+from selfmotion.shell.view import (
+    Session,
+    application,
+    configuration,
+    listening,
+    opened as open_page,
+)
 
 TOKEN = "the-token-of-the-tests"
 # A circle beside a post, with a comment to be kept.
@@ -101,7 +107,8 @@ def moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[list[floa
 @contextmanager
 def opened(file: Path) -> Iterator[Session]:
     """Yield the session of a file; its planner ends."""
-    session = Session(file)
+    session = open_page(file)
+    assert isinstance(session, Session)
     try:
         yield session
     finally:

@@ -107,7 +107,7 @@ def saved(page: Any, server: Served) -> sm.Plan:
     """Save, and return what `selfmotion plan` makes of the file."""
     if page.locator("#save").is_enabled():
         page.locator("#save").click()
-        page.locator("#told", has_text="Saved.").wait_for()
+        page.locator("#told", has_text="Saved circle.toml.").wait_for()
     job = sm.files.read_job(server.session.edited.file)
     return sm.plan(job.problem, **job.settings)
 

@@ -8,7 +8,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.shell.view import Session
-from selfmotion.shell.view.planning import Found, NewerRequest, Planning, Request
+from selfmotion.shell.view.found import Found, NewerRequest, Request
+from selfmotion.shell.view.planning import Planning
 from support.views import CIRCLE, Heard, moved, opened
 
 
@@ -68,7 +69,7 @@ def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     assert found["kind"] == "none"
     assert found["words"].startswith("not verified: ")
     assert "no configuration" in found["words"]
-    assert found["stopped"][0]["path"].endswith("/stopped/path")
+    assert found["stopped"][0]["path"].endswith("/stopped/path0")
     # The arm stands there, and what it has to follow is drawn where it is.
     assert not found["plans"][0]["verified"]
     page.session.answer({"do": "undo"})
@@ -249,7 +250,7 @@ def test_a_plan_that_nobody_waits_for_is_left(tmp_path):
     planning._tell = take
     with pytest.raises(NewerRequest):
         planning.answer(Request(1, document))
-    assert [one.request.number for one in found if one.kind == "whole"] == [0, 0]
+    assert [one.request.number for one in found if one.kind == "whole"] == [0]
 
 
 def test_messages_are_json_that_browsers_read(page):

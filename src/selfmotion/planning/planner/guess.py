@@ -67,10 +67,13 @@ def pace_of(plan: Plan, formulation: Formulation) -> float:
     return plan.path.duration / formulation.path.duration
 
 
-def slower(trajectory: Trajectory, pace: float) -> Trajectory:
-    """Return the same motion, faster by the factor `pace`: its duration over the new one."""
+def lasting(trajectory: Trajectory, duration: float) -> Trajectory:
+    """Return the same motion, as much faster or slower that it ends at a time [s], exactly."""
+    pace = trajectory.t[-1] / duration
     qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd
     t, qd = trajectory.t / pace, pace * trajectory.qd
+    # By rounding the last time would be another one.
+    t[-1] = duration
     return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)
 
 
@@ -173,7 +176,7 @@ class Guess:
         formulation, warm, t = self.formulation, self.plan, first_nodes(self.formulation)
         motions = [self.motion or self.minimum_norm.evaluation.trajectory]
         if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
-            own = slower(warm.trajectory, pace_of(warm, formulation))
+            own = lasting(warm.trajectory, formulation.path.duration)
             if not self.free:
                 own = moved_to(own, self.minimum_norm.motion.start)
             motions = [own, *motions]

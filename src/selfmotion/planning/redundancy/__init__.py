@@ -1,5 +1,6 @@
 """Redundancy maps: time against the self-motion's coordinate, and what stops the arm where."""
 
+from selfmotion.planning.redundancy.axis import coordinates_of as coordinates_of
 from selfmotion.planning.redundancy.judging import Reason as Reason
 from selfmotion.planning.redundancy.map import (
     PIXELS as PIXELS,

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.basics import Array, Ints, ProblemError, nearest, shown
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Follows, completed
+from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import SwivelAngle, null_space
 from selfmotion.model.task import Task
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.redundancy.kernels import OWN, SWIVEL, TURN_OF_TOOL
+from selfmotion.planning.redundancy.slices import slices_of
+from selfmotion.problem.constraints import ActiveConstraint
 
 # Names by which the coordinates other than joints are chosen.
 TOOL, ELBOW = "tool", "elbow"
 # Times of a motion at which the coordinate is chosen.
 _FEW_TIMES = 17
-# Displacement along a self-motion over which the change of the cost is compared [rad or m],
-# configuration norm: a pixel or two of most maps.
-_ASIDE = 0.05
 # Least distance of the elbow from the line of shoulder and wrist, as a share of the arm's reach, at
 # which a swivel says where the elbow is.
 _BENT = 0.01
@@ -39,6 +40,8 @@ class Axis:
 
     Attributes
     ----------
+    name : str
+        By which it is chosen.
     label : str
         In words.
     unit : str
@@ -53,6 +56,7 @@ class Axis:
         Its value per unit of what the kernels compute: tolerances count in units of their bands.
     """
 
+    name: str
     label: str
     unit: str
     code: Ints
@@ -93,45 +97,68 @@ class Axis:
         return np.linspace(low - room, high + room, count)
 
 
-def axis_of(formulation: Formulation, times: Array, z: Array, chosen: str | None) -> Axis:
-    """Return the coordinate of a map: the `chosen` one, or that of a rule.
-
-    The rule: the rotation of the tool about its axis for pointing tasks; else, with one degree of
-    redundancy, the deviation where one tolerance is all of it, the external axis where one joint
-    alone is a part of the cell, or is the only prismatic one, and the swivel of the elbow for arms
-    of seven revolute joints; else, the joint that the self-motion moves most where it moves it
-    least. With more degrees, the joint along whose self-motion the cost changes most.
+def axis_of(
+    formulation: Formulation,
+    motion: Trajectory,
+    chosen: str | None,
+    active: Sequence[ActiveConstraint] = (),
+) -> Axis:
+    """Return the coordinate of a map: the `chosen` one, or the first of `coordinates_of`.
 
     Parameters
     ----------
     formulation : Formulation
-    times : (K,)
-        Of the motion [s].
-    z : (K, n)
-        The motion in all coordinates.
+    motion : Trajectory
+        Of the arm.
     chosen : str or None
         ``"tool"``, ``"elbow"``, or the name of a joint.
+    active : sequence of ActiveConstraint
+        What keeps the motion from a lower cost, the most expensive first.
 
     Raises
     ------
     ProblemError
         There is no such coordinate here.
     """
-    follows = formulation.follows
-    few = np.unique(np.linspace(0, len(times) - 1, _FEW_TIMES).round().astype(int))
-    if chosen is not None:
-        return _named(formulation, z[few], chosen)
-    if _turns_tool(follows):
-        return _tool()
-    if follows.redundancy == 1:
-        external = _external(formulation)
-        if external is not None:
-            return _joint(formulation, external)
-        if has_elbow(formulation, z[few]):
-            return _elbow(formulation)
-        basis = np.abs(null_space(follows.jacobians(z[few])))[:, :, 0]
-        return _joint(formulation, int(np.argmax(basis.min(axis=0))))
-    return _joint(formulation, _dearest(formulation, times[few], z[few]))
+    name = coordinates_of(formulation, motion, active)[0] if chosen is None else chosen
+    return _named(formulation, _along(formulation, motion)[1], name)
+
+
+def coordinates_of(
+    formulation: Formulation, motion: Trajectory, active: Sequence[ActiveConstraint]
+) -> tuple[str, ...]:
+    """Return the coordinates of maps by name, the one that tells most first.
+
+    With one degree of redundancy that is one: the rotation of the tool about its axis for pointing
+    tasks; else the deviation where one tolerance is all of it, the external axis where one joint
+    alone is a part of the cell, or is the only prismatic one, and the swivel of the elbow for arms
+    of seven revolute joints; else, the joint that the self-motion moves most where it moves it
+    least. With more degrees maps are slices: first along the joints that active constraints name,
+    by their multipliers; then the rotation of the tool where it is free; then the joints along
+    whose self-motion the cost changes most. Parameters as in `axis_of`.
+    """
+    follows, names = formulation.follows, formulation.coordinates.names
+    times, z = _along(formulation, motion)
+    tool = [TOOL] if _turns_tool(follows) else []
+    if follows.redundancy > 1:
+        limited, moved = slices_of(formulation, times, z, active)
+        first, last = ([names[k] for k in joints] for joints in (limited, moved))
+        return tuple(dict.fromkeys([*first, *tool, *last]))
+    if tool:
+        return (TOOL,)
+    external = _external(formulation)
+    if external is not None:
+        return (names[external],)
+    if has_elbow(formulation, z):
+        return (ELBOW,)
+    basis = np.abs(null_space(follows.jacobians(z)))[:, :, 0]
+    return (names[int(np.argmax(basis.min(axis=0)))],)
+
+
+def _along(formulation: Formulation, motion: Trajectory) -> tuple[Array, Array]:
+    """Return a few times (K,) of a motion, and all coordinates then, (K, n)."""
+    times = np.linspace(float(motion.t[0]), float(motion.t[-1]), _FEW_TIMES)
+    return times, completed(formulation.follows, times, motion(times))
 
 
 def _named(formulation: Formulation, z: Array, chosen: str) -> Axis:
@@ -165,7 +192,7 @@ def _named(formulation: Formulation, z: Array, chosen: str) -> Axis:
 
 def _tool() -> Axis:
     code = np.array([TURN_OF_TOOL, 0, 0, 0], dtype=np.int64)
-    return Axis("rotation of the tool about its axis", "rad", code, np.zeros(3))
+    return Axis(TOOL, "rotation of the tool about its axis", "rad", code, np.zeros(3))
 
 
 def _joint(formulation: Formulation, k: int) -> Axis:
@@ -174,7 +201,7 @@ def _joint(formulation: Formulation, k: int) -> Axis:
     size = float(coordinates.sizes[k]) if k >= formulation.robot.dof else 1.0
     limits = size * float(envelope.lower[k]), size * float(envelope.upper[k])
     label = coordinates.label(k).removeprefix("the ")
-    return Axis(label, coordinates.unit(k), code, np.zeros(3), *limits, size)
+    return Axis(coordinates.names[k], label, coordinates.unit(k), code, np.zeros(3), *limits, size)
 
 
 def _elbow(formulation: Formulation) -> Axis:
@@ -183,7 +210,7 @@ def _elbow(formulation: Formulation) -> Axis:
     upwards = np.asarray(SwivelAngle().reference, dtype=np.float64)
     base = formulation.follows.items[0].chain.base_placement
     reference = np.ascontiguousarray(base.rotation.T @ upwards)
-    return Axis(SwivelAngle().name, "rad", code, reference)
+    return Axis(ELBOW, SwivelAngle().name, "rad", code, reference)
 
 
 def _turns_tool(follows: Follows) -> bool:
@@ -224,24 +251,3 @@ def _external(formulation: Formulation) -> int | None:
         if len(found) == 1:
             return int(found[0])
     return None
-
-
-def _dearest(formulation: Formulation, times: Array, z: Array) -> int:
-    """Return the joint along whose self-motion the cost changes most, over configurations (K, n).
-
-    Each joint's self-motion is the direction N Nᵀe of unit length; a change is the mean of |G(+h) -
-    G(-h)| + |G(+h) + G(-h) - 2 G(0)|, of costs as `local_cost` has them.
-    """
-    from selfmotion.planning.redundancy.judging import local_cost
-
-    follows = formulation.follows
-    basis = null_space(follows.jacobians(z))
-    here = local_cost(formulation, times, z)
-    changes = []
-    for k in range(follows.dof):
-        along = np.einsum("knr,kr->kn", basis, basis[:, k])
-        size = np.linalg.norm(along, axis=1, keepdims=True)
-        step = _ASIDE * along / np.maximum(size, _ASIDE)
-        ahead, back = (local_cost(formulation, times, z + way * step) for way in (1.0, -1.0))
-        changes.append(np.mean(np.abs(ahead - back) + np.abs(ahead + back - 2.0 * here)))
-    return int(np.argmax(changes))

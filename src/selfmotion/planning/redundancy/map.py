@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,11 @@ from selfmotion.basics import (
     Flags,
     Ints,
     ProblemError,
+    Progress,
     as_path,
     as_whole,
     read_archive,
+    silent,
     write_archive,
 )
 from selfmotion.model.follow import chain_tables, completed
@@ -27,6 +30,7 @@ from selfmotion.planning.redundancy.judging import NEAR_SINGULAR, Judge, LocalMo
 from selfmotion.planning.redundancy.kernels import continue_all
 from selfmotion.planning.redundancy.picture import drawn
 from selfmotion.planning.search import Manifold
+from selfmotion.problem.constraints import ActiveConstraint
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +39,8 @@ if TYPE_CHECKING:
 PIXELS = (121, 121)
 # Largest number of pixels to a side: a hundred times as many take minutes.
 _MOST_PIXELS = 2000
+# Configurations that are judged at once.
+_AT_ONCE = 1000
 # Samples of a plan's line between two pixels: angles between them turn by much less than π.
 _BETWEEN = 8
 # Kind of a file of a map.
@@ -206,6 +212,8 @@ def redundancy_map_of(
     initial: Trajectory,
     coordinate: str | None,
     shape: tuple[int, int],
+    active: Sequence[ActiveConstraint] = (),
+    progress: Progress = silent,
 ) -> RedundancyMap:
     """Return the map of a motion; see `Plan.redundancy_map`.
 
@@ -219,6 +227,10 @@ def redundancy_map_of(
         ``"tool"``, ``"elbow"``, or a joint; None for the rule of `axis_of`.
     shape : (int, int)
         Numbers N and M of pixels.
+    active : sequence of ActiveConstraint
+        What keeps the motion from a lower cost.
+    progress : callable
+        Told how many of the times are judged.
 
     Raises
     ------
@@ -228,14 +240,14 @@ def redundancy_map_of(
     columns, rows = _shape(shape)
     times = np.linspace(float(motion.t[0]), float(motion.t[-1]), columns)
     z = completed(formulation.follows, times, motion(times))
-    axis = axis_of(formulation, times, z, coordinate)
+    axis = axis_of(formulation, motion, coordinate, active)
     line = _line(formulation, axis, motion, times)
     start = _line(formulation, axis, initial, times)
     if axis.turns:
         start -= 2.0 * np.pi * np.round((start[0] - line[0]) / (2.0 * np.pi))
     values = axis.grid([line, start[np.isfinite(start)]], rows)
     found = _continued(formulation, axis, times, z, line, values)
-    judged = _judged(formulation, times, z, found)
+    judged = _judged(formulation, times, z, found, progress)
     return RedundancyMap(
         axis.label,
         axis.unit,
@@ -250,19 +262,34 @@ def redundancy_map_of(
     )
 
 
-def _judged(formulation: Formulation, times: Array, z: Array, found: Array) -> dict[str, Any]:
+def _judged(
+    formulation: Formulation, times: Array, z: Array, found: Array, progress: Progress
+) -> dict[str, Any]:
     """Return what stops configurations (N, M, n) and the plan's own (N, n), and what they cost."""
-    reached = ~np.isnan(found).any(axis=2)
+    reached = np.asarray(~np.isnan(found).any(axis=2))
     state = np.full(reached.shape, int(Reason.NO_CONFIGURATION), dtype=np.int64)
     cause, cost = np.full(reached.shape, -1, dtype=np.int64), np.full(reached.shape, np.nan)
     judge, own = Judge(formulation), LocalMotion(formulation, times, z)
-    least = NEAR_SINGULAR * float(own.singular_values.max())
-    if reached.any():
-        moments = np.broadcast_to(times[:, None], reached.shape)[reached]
-        local = LocalMotion(formulation, moments, np.ascontiguousarray(found[reached]))
-        least = max(least, NEAR_SINGULAR * float(local.singular_values.max()))
-        state[reached], cause[reached] = judge.judge(local, least)
-        cost[reached] = local.cost()
+    # Some at a time, so that others may ask for something else in between.
+    some = max(_AT_ONCE // found.shape[1], 1)
+    parts = [slice(first, first + some) for first in range(0, len(times), some)]
+    local = [
+        LocalMotion(
+            formulation,
+            np.broadcast_to(times[part, None], reached[part].shape)[reached[part]],
+            np.ascontiguousarray(found[part][reached[part]]),
+        )
+        for part in parts
+    ]
+    known = [one for one in (own, *local) if len(one.t)]
+    largest = [float(one.singular_values.max()) for one in known]
+    least = NEAR_SINGULAR * max(largest)
+    for part, one in zip(parts, local, strict=True):
+        progress("redundancy map", min(part.stop, len(times)), len(times))
+        if len(one.t):
+            here = reached[part]
+            state[part][here], cause[part][here] = judge.judge(one, least)
+            cost[part][here] = one.cost()
     plan_state, _ = judge.judge(own, least)
     given = {"state": state, "cause": cause, "cost": cost, "plan_state": plan_state}
     return {**given, "causes": tuple(judge.causes)}

@@ -44,7 +44,12 @@ from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.redundancy import PIXELS, RedundancyMap, redundancy_map_of
+from selfmotion.planning.redundancy import (
+    PIXELS,
+    RedundancyMap,
+    coordinates_of,
+    redundancy_map_of,
+)
 from selfmotion.planning.result.archive import Archive, in_order_of
 from selfmotion.planning.result.measured import (
     LimitsUsed,
@@ -257,7 +262,11 @@ class Plan:
         return deviation_along(self.problem, self.trajectory, t)
 
     def redundancy_map(
-        self, coordinate: str | None = None, *, shape: tuple[int, int] = PIXELS
+        self,
+        coordinate: str | None = None,
+        *,
+        shape: tuple[int, int] = PIXELS,
+        progress: Progress = silent,
     ) -> RedundancyMap:
         """Return what the self-motion could have chosen along the path, and what stops it there.
 
@@ -270,11 +279,11 @@ class Plan:
         coordinate : str, optional
             ``"tool"``, the rotation of the tool about its axis (task ``"pointing"``); ``"elbow"``,
             the swivel angle of an arm of seven revolute joints; or the name of a joint. By default
-            the tool's rotation where it is free; else, with one degree of redundancy, the place of
-            an external axis, the swivel angle, or the joint that the self-motion always moves;
-            with more degrees, the joint along whose self-motion the cost changes most.
+            the first of `redundancy_coordinates`.
         shape : (int, int)
             Numbers of pixels along the path, and along the coordinate.
+        progress : callable
+            Told how many of the times are judged, as ``("redundancy map", 40, 121)``.
 
         Raises
         ------
@@ -287,7 +296,21 @@ class Plan:
             self.initial_trajectory,
             coordinate,
             shape,
+            self.report.active,
+            progress,
         )
+
+    def redundancy_coordinates(self) -> tuple[str, ...]:
+        """Return the coordinates of redundancy maps by name, the one that tells most first.
+
+        With one degree of redundancy that is one: the tool's rotation where it is free; else the
+        place of an external axis, the swivel angle, or the joint that the self-motion always moves.
+        With more degrees each is a slice: first the joints that keep the plan from a lower cost, by
+        the multipliers of their limits and of the distances that they change; then the tool's
+        rotation where it is free; then the joints along whose self-motion the cost changes most.
+        """
+        formulation = Formulation.of(self.problem)
+        return coordinates_of(formulation, self.trajectory, self.report.active)
 
     def evaluate(self, cost: Cost) -> float:
         """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.

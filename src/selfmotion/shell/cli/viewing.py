@@ -6,13 +6,19 @@ from typing import Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import documents, options
+from selfmotion.shell.cli import documents, jobs, options
 from selfmotion.shell.cli.app import LOOK, app, stages, terminal
+
+# What a page can show.
+_SUFFIXES = (*documents.SUFFIXES, ".yaml", ".yml", ".npz", jobs.PROGRAM, jobs.PARTS)
 
 
 @app.command(epilog="Example: selfmotion view cell.toml", rich_help_panel=LOOK)
 def view(
-    file: Annotated[Path, typer.Argument(help="A problem file (.toml, .json).")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="A problem or job file (.toml, .json), a plan (.npz), or a .program."),
+    ],
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of this machine; 0 for a free one.")
     ] = 0,
@@ -23,19 +29,21 @@ def view(
 ) -> None:
     """Drag the part, the base, obstacles on a page, slide numbers, and see the plan follow.
 
-    The page is served on this machine only, to who has its address; the file changes when it is
+    Of a job all of its seams are planned, with the moves between them. A plan's own problem is
+    changed, and saved with its plan; a program is shown as it is, and judged as `check` does. The
+    page is served on this machine only, to who has its address; the file changes when it is
     saved. Ends with Ctrl-C. Needs the extra `view`.
     """
     from selfmotion.shell import view as pages
 
     pages.check_server()
-    if file.suffix not in (*documents.SUFFIXES, ".yaml", ".yml"):
+    if file.suffix not in _SUFFIXES:
         raise sm.errors.ProblemError(
-            f"{file}: has suffix '{file.suffix}', expected a problem file (.toml or .json); "
-            f"`selfmotion replay` shows plans and programs"
+            f"{file}: has suffix '{file.suffix}', expected a problem file or a job file (.toml, "
+            f".json, .yaml), a plan (.npz), or a {jobs.PROGRAM} or {jobs.PARTS} file"
         )
     with stages.status("planning …"):
-        session = pages.Session(file, allow_code=allow_code)
+        session = pages.opened(file, allow_code=allow_code)
     pages.serve(session, port=port, opens=not no_open, told=_tell)
 
 

@@ -30,6 +30,7 @@ from selfmotion.shell.documents.problem_parts import (
     path_of as path_of,
 )
 from selfmotion.shell.documents.problem_writing import (
+    problem_document as problem_document,
     write_problem as write_problem,
 )
 from selfmotion.shell.documents.seam_job import (

@@ -52,12 +52,17 @@ def write_problem(problem: Problem | PlanRequest, file: str | FilePath) -> None:
     """
     path = as_path(file)
     if not isinstance(problem, PlanRequest):
-        check_problem(problem)
-        write_document(path, _named_beside(problem_table(problem), path))
+        write_document(path, problem_document(problem, path))
         return
     # Plain keys stand before the first table.
     table = _named_beside({**_settings(problem), **problem_table(problem.problem)}, path)
     write_document(path, dict(sorted(table.items(), key=lambda item: isinstance(item[1], dict))))
+
+
+def problem_document(problem: Problem, file: FilePath) -> dict[str, Any]:
+    """Return what a problem file says of a problem; ProblemError as for `write_problem`."""
+    check_problem(problem)
+    return _named_beside(problem_table(problem), file)
 
 
 def _named_beside(table: dict[str, Any], file: FilePath) -> dict[str, Any]:

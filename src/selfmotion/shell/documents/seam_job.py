@@ -1,5 +1,6 @@
 """From a file of many seams to a job."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
@@ -179,9 +180,16 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
 
 
 def seam_job_of(
-    document: Mapping[str, Any], file: FilePath, *, allow_code: bool = False
+    document: Mapping[str, Any],
+    file: FilePath,
+    *,
+    allow_code: bool = False,
+    memory: dict[str, Any] | None = None,
 ) -> SeamJob:
-    """Return the job that a document of a file describes. See `read_seam_job`."""
+    """Return the job that a document of a file describes. See `read_seam_job`.
+
+    Where many documents are read, those with the same arm share it by `memory`.
+    """
     given, settings = document.get("seams"), document.get("job", {})
     if isinstance(given, dict) and given.get("feed") == HIGHEST:
         return _at_highest(document, given, file, allow_code=allow_code)
@@ -204,7 +212,7 @@ def seam_job_of(
             )
     if not isinstance(shared.get(NAME, {}), Mapping):
         raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
-    reader = _Reader(file, shared, allow_code, {})
+    reader = _Reader(file, shared, allow_code, {} if memory is None else memory)
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first
@@ -323,7 +331,7 @@ class _Reader:
         table = self._file.parent / values["file"]
         options = {key: values[key] for key in _PACED if key in values}
         rest = {key: value for key, value in given.items() if key not in OF_TABLE}
-        found, seams = list[Seam](), read_seams(table, options)
+        found, seams = list[Seam](), self._seams_of(table, options)
         # What a machine switches stays switched in the cuts that follow: they keep their order.
         switched = any(rows.one_way and rows.events for _, rows in seams.values())
         for name, (path, rows) in seams.items():
@@ -350,6 +358,14 @@ class _Reader:
                 path = in_reference(path, self.first.problem.robot)
             found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
+
+    def _seams_of(self, table: FilePath, options: Mapping[str, Any]) -> Any:
+        """Return the seams of a file; the same file is read once for many documents."""
+        changed = table.stat().st_mtime_ns if is_file(table) else 0
+        key = json.dumps(["seams", str(table), changed, options], default=str)
+        if key not in self._memory:
+            self._memory[key] = read_seams(table, options)
+        return self._memory[key]
 
     def settings(self, given: Any) -> dict[str, Any]:
         """Return the settings of [job]."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,7 +23,7 @@ from selfmotion.shell.replay.motion import (
     self_motion,
     torque_limits,
 )
-from selfmotion.shell.replay.redundancy import map_of, packed_map, tree
+from selfmotion.shell.replay.redundancy import SeamMaps, maps_of, packed_maps, tree
 from selfmotion.shell.replay.whole import Whole, describe, table
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
@@ -81,7 +83,7 @@ class _Motion:
     ) -> None:
         robot = plan.robot
         self.plan, self.whole = plan, whole
-        self.with_map = with_map and whole is None
+        self.maps = maps_of(plan, whole) if with_map else []
         self.frames = key_frames(robot, plan.trajectory)
         still = plan.initial_trajectory is plan.trajectory
         self.ghost = self.frames if still else key_frames(robot, plan.initial_trajectory)
@@ -164,12 +166,14 @@ def plan_content(
     triads: int,
     whole: Whole | None = None,
     brief: bool = False,
+    maps: Sequence[SeamMaps] = (),
 ) -> Json:
     """Return what of a page is another with another plan, in a scene of that radius [m].
 
-    Without the redundancy map; a `brief` one also without distances and self-motions.
+    With the redundancy maps that are given; a `brief` one without distances and self-motions.
     """
     motion = _Motion(plan, whole, brief=brief, with_map=False)
+    motion.maps += maps
     scale = _scale([motion])
     root = "/selfmotion/plan0"
     longest = float(np.linalg.norm(motion.shown.ellipsoid, axis=(1, 2)).max())
@@ -224,7 +228,7 @@ def _plan(
     size: float,
 ) -> Json:
     """Return what a page needs of one plan, its traces below the node `root`."""
-    plan, shown, whole = motion.plan, motion.shown, motion.whole
+    shown, whole = motion.shown, motion.whole
     times = (
         np.linspace(0.0, shown.t[-1], triads)
         if isinstance(triads, int)
@@ -249,7 +253,7 @@ def _plan(
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
-        "redundancy": packed_map(map_of(plan), payload) if motion.with_map else None,
+        "redundancy": packed_maps(motion.maps, payload),
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {

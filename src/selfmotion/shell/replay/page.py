@@ -27,7 +27,7 @@ from selfmotion.basics import (
 )
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shell.replay.content import page_content
-from selfmotion.shell.replay.meshes import Payload
+from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.still import still
 from selfmotion.shell.replay.whole import Whole, describe
 from selfmotion.work.job import Program
@@ -102,16 +102,23 @@ def replay_html(
     return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
 
 
-def live_html(plan: Plan, *, title: str) -> tuple[str, float]:
+def live_html(
+    plan: Plan, *, title: str, whole: Whole | None = None, live: Json
+) -> tuple[str, float]:
     """Return the page of a plan that is changed while it is shown, and the scene's radius [m].
 
-    It is that of `replay_html` with the modules that a server is asked by: see `shell.view`.
+    It is that of `replay_html` with the modules that a server is asked by: see `shell.view`, which
+    says in `live` what they have to know. `whole` is what the plan stands for, where it does.
     """
     payload = Payload()
-    content = page_content([plan], ["plan"], payload, triads=_TRIADS, with_map=False)
-    picture = still(plan.robot, plan.trajectory, plan.obstacles, content["camera"], [])
-    live = payload.pack({**content, "live": True})
-    page = _assemble(title, describe(plan), live, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))
+    triads = 0 if whole else _TRIADS
+    content = page_content([plan], ["plan"], payload, triads=triads, whole=whole, with_map=False)
+    obstacles = plan.obstacles if whole is None else whole.obstacles
+    seams = [] if whole is None else whole.seams()
+    picture = still(plan.robot, plan.trajectory, obstacles, content["camera"], seams)
+    packed = payload.pack({**content, "live": live})
+    said = describe(plan) if whole is None else whole.description
+    page = _assemble(title, said, packed, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))
     return page, float(content["radius"])
 
 

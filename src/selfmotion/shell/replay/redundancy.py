@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Progress, silent
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.redundancy import (
     COST_COLORS,
@@ -17,12 +20,18 @@ from selfmotion.planning.redundancy import (
 )
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json, Payload
+from selfmotion.shell.replay.whole import Whole
 
 # Steps of a joint's range, and of the range of costs, in which numbers travel: of a turn 0.1 mrad,
 # of costs less than a shade that can be told from the next.
 _JOINT_STEPS, _COST_STEPS = 2**16 - 1, 2**8 - 1
-# Pixels where bodies are not convex: searching their surfaces takes twenty times as long as hulls.
-_FEWER_PIXELS = (61, 61)
+# Numbers of pixels along the path and upwards.
+Pixels = tuple[int, int]
+# Pixels of jobs, of further slices, and where bodies are not convex: searching their surfaces takes
+# twenty times as long as hulls.
+FEWER_PIXELS: Pixels = (61, 61)
+# Slices that a page has at most; seams beyond which none of a job has a map.
+SLICES, MOST_SEAMS = 3, 24
 # Stands for no cause.
 _NO_CAUSE = 2**16 - 1
 
@@ -41,10 +50,59 @@ def tree(robot: RobotModel, payload: Payload) -> Json:
     }
 
 
-def map_of(plan: Plan) -> RedundancyMap:
-    """Return the map of a plan for a page: of as many pixels as take about a second."""
+@dataclass(frozen=True, eq=False)
+class SeamMaps:
+    """The maps of a plan: one, or slices where there are several degrees of redundancy.
+
+    Attributes
+    ----------
+    begin : float
+        When the plan begins in what is shown [s].
+    name : str
+        Of the seam; "" for a plan alone.
+    maps : tuple of RedundancyMap
+        The first tells most.
+    """
+
+    begin: float
+    name: str
+    maps: tuple[RedundancyMap, ...]
+
+
+def maps_of(plan: Plan, whole: Whole | None) -> list[SeamMaps]:
+    """Return the maps for a page: of as many pixels as take about a second for a plan."""
+    if whole is None:
+        return [SeamMaps(0.0, "", slices(plan, PIXELS))]
+    if len(whole.plans) > MOST_SEAMS:
+        return []
+    return [SeamMaps(begin, name, slices(one, FEWER_PIXELS)) for begin, name, one in whole.plans]
+
+
+def slices(
+    plan: Plan, most: Pixels, progress: Progress = silent, count: int = SLICES
+) -> tuple[RedundancyMap, ...]:
+    """Return the first `count` slices of a plan, the other ones with fewer pixels."""
     are_convex = all(model.is_all_convex for model, _ in plan.problem.envelope.bodies)
-    return plan.redundancy_map(shape=PIXELS if are_convex else _FEWER_PIXELS)
+    first = most if are_convex else FEWER_PIXELS
+    names = plan.redundancy_coordinates()[:count]
+    return tuple(
+        plan.redundancy_map(
+            name, shape=first if k == 0 else min(first, FEWER_PIXELS), progress=progress
+        )
+        for k, name in enumerate(names)
+    )
+
+
+def packed_maps(seams: Sequence[SeamMaps], payload: Payload) -> list[Json]:
+    """Return the JSON of maps; their arrays go into `payload`."""
+    return [
+        {
+            "begin": one.begin,
+            "name": one.name,
+            "slices": [packed_map(shown, payload) for shown in one.maps],
+        }
+        for one in seams
+    ]
 
 
 def packed_map(shown: RedundancyMap, payload: Payload) -> Json:

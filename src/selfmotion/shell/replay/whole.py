@@ -184,6 +184,8 @@ class Whole:
         All that stands there in the end.
     grows : bool
         Whether some of it stands there only later, so that one distance tells nothing.
+    plans : tuple of (float, str, Plan)
+        When each seam begins [s], its name and its plan; empty where these are not shown.
     """
 
     plan: Plan
@@ -193,6 +195,7 @@ class Whole:
     events: tuple[tuple[float, str], ...]
     obstacles: tuple[Obstacle, ...]
     grows: bool
+    plans: tuple[tuple[float, str, Plan], ...] = ()
 
     @classmethod
     def of(cls, made: Program | Parts | Move) -> "Whole":
@@ -212,9 +215,10 @@ class Whole:
         else:
             constraints, known = made.constraints, list(made.obstacles)
         unique = {item.name: item for item in known}
-        plan = _stand_in(made.robot, motion, constraints)
+        plan = stand_in(made.robot, motion, constraints)
         standing = tuple(unique.values())
-        return cls(plan, marks, made.verdict, made.verified, events, standing, grows)
+        plans = tuple(_plans(made))
+        return cls(plan, marks, made.verdict, made.verified, events, standing, grows, plans)
 
     @property
     def points(self) -> int:
@@ -325,7 +329,7 @@ class _Performed(Path, kind="_performed"):
         return PathSamples(t, places, turns, twists)
 
 
-def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...]) -> Plan:
+def stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...]) -> Plan:
     """Return a plan with a motion, for what pages do with plans."""
     tasks = [task for task in (Task.POSITION, Task.PLANAR) if robot.can_follow(task)]
     free = [task for task in tasks if robot.redundancy(task) > 0]
@@ -355,6 +359,16 @@ def unproved(problem: Problem, motion: Trajectory, words: str = "") -> Plan:
     status = Status.INFEASIBLE if words else Status.CONVERGED
     report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), status, words, 0.0)
     return Plan(problem, motion, motion, np.zeros(0), report, certificate)
+
+
+def _plans(made: Program | Parts | Move) -> Iterator[tuple[float, str, Plan]]:
+    if isinstance(made, Program):
+        for begin, step in zip(made.begins, made.steps, strict=True):
+            if isinstance(step.made, Plan):
+                yield begin, step.name, step.made
+    elif isinstance(made, Parts):
+        for number, (begin, plan) in enumerate(zip(made.begins, made.plans, strict=True), 1):
+            yield begin, f"part {number}", plan
 
 
 def _marks(made: Program | Parts | Move) -> Iterator[Mark]:

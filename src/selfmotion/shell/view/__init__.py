@@ -1,5 +1,6 @@
 """A page that shows a plan while its problem is changed: handles, sliders, undo, save, export."""
 
+from selfmotion.shell.view.opening import opened as opened
 from selfmotion.shell.view.server import (
     application as application,
     check_server as check_server,
@@ -8,3 +9,4 @@ from selfmotion.shell.view.server import (
     serve as serve,
 )
 from selfmotion.shell.view.session import Session as Session
+from selfmotion.shell.view.sitting import Sitting as Sitting

@@ -6,7 +6,11 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, NoReturn
 
+from typing_extensions import override
+
 from selfmotion.basics import FileFormatError, read_document, text_of, write_document, write_text
+from selfmotion.planning.result import Plan
+from selfmotion.shell.documents import problem_document
 
 # The way to a value: keys of tables, and places in lists.
 Keys = tuple[str | int, ...]
@@ -30,12 +34,20 @@ class Edited:
     """
 
     def __init__(self, file: Path) -> None:
+        self._begin(file, read_document(file))
+
+    def _begin(self, file: Path, document: Mapping[str, Any]) -> None:
         self.file = file
-        self.document: dict[str, Any] = dict(read_document(file))
+        self.document: dict[str, Any] = dict(document)
         self._content = file.read_bytes()
         self._saved = deepcopy(self.document)
         self._past: list[dict[str, Any]] = []
         self._before: dict[str, Any] | None = None
+
+    @property
+    def saves(self) -> str:
+        """What is written when it is saved, in words."""
+        return self.file.name
 
     @property
     def is_changed(self) -> bool:
@@ -86,12 +98,15 @@ class Edited:
                 f"{self.file}: was changed or moved by others since it was opened, and is left as "
                 f"it is; keep a copy of what you want of it, and open it again"
             )
+        self._write()
+        self._content = self.file.read_bytes()
+        self._saved = deepcopy(self.document)
+
+    def _write(self) -> None:
         if self.file.suffix == ".toml":
             write_text(self.file, self._toml())
         else:
             write_document(self.file, self.document)
-        self._content = self.file.read_bytes()
-        self._saved = deepcopy(self.document)
 
     def _toml(self) -> str:
         import tomlkit
@@ -105,6 +120,41 @@ class Edited:
                 f"inline or dotted as [tables], or keep it as .json"
             )
         return text
+
+
+class EditedPlan(Edited):
+    """The problem of a plan's file, changed like a problem file; what is saved is a plan again.
+
+    Parameters
+    ----------
+    file : Path
+        .npz.
+    plan : Plan
+        What it holds; then what is saved.
+
+    Raises
+    ------
+    ProblemError
+        Its problem cannot be written, as it holds functions.
+    """
+
+    def __init__(self, file: Path, plan: Plan) -> None:
+        self.plan = plan
+        self._begin(file, problem_document(plan.problem, file))
+
+    @property
+    @override
+    def saves(self) -> str:
+        return f"{self.file.name}: the plan that is shown, with its problem"
+
+    @override
+    def _write(self) -> None:
+        self.plan.save(self.file)
+
+
+def is_job(document: Mapping[str, Any]) -> bool:
+    """Whether a document is of many seams."""
+    return "seams" in document or "job" in document
 
 
 def at(document: Any, keys: Keys) -> Any:

@@ -12,7 +12,7 @@ from selfmotion.model.task import SE3
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.replay.links import GHOST, ROBOT, joint_name, safe
 from selfmotion.shell.replay.meshes import Json
-from selfmotion.shell.view.document import Keys, at
+from selfmotion.shell.view.document import Keys, at, is_job
 from selfmotion.shell.view.poses import read_pose, rounded, write_pose
 
 # Of more waypoints none is dragged: they would hide the path.
@@ -74,9 +74,11 @@ class Handle:
 
 
 def handles_of(document: Mapping[str, Any], problem: Problem) -> dict[str, Handle]:
-    """Return what can be dragged by name."""
+    """Return what can be dragged by name; of no document nothing."""
+    if not document:
+        return {}
     found = [
-        *_of_path(document, problem),
+        *(_of_seams if is_job(document) else _of_problem)(document, problem),
         *_of_bases(document),
         *_of_obstacles(document, problem),
         *_of_tool(document, problem.robot),
@@ -107,6 +109,9 @@ def dragged(document: Mapping[str, Any], handle: Handle, shown: SE3) -> dict[Key
             values = _moved_shape(document, handle, pose)
         case _:
             values = {handle.keys: write_pose(at(document, handle.keys), pose)}
+    if is_job(document):
+        # A job says itself where it starts, and seams begin anywhere.
+        return values
     # A shape without a start begins wherever the tool is.
     follows_arm = "start" not in document["path"] and document["path"].get("kind") in _SHAPES
     freed = handle.kind in ("part", "path") or (handle.kind == "waypoint" and handle.keys[-1] == 0)
@@ -122,39 +127,81 @@ def _path_prefix(document: Mapping[str, Any], problem: Problem) -> tuple[int, SE
     return chain.carrier, SE3(chain.base_placement)
 
 
-def _of_path(document: Mapping[str, Any], problem: Problem) -> Iterator[Handle]:
+def _of_problem(document: Mapping[str, Any], problem: Problem) -> Iterator[Handle]:
+    """Return the handles of the part, else of the path, and of its waypoints."""
     joint, prefix = _path_prefix(document, problem)
-    path, piece = document["path"], document.get("workpiece")
-    if piece is not None:
-        frame = read_pose(piece.get("frame"))
-        own = [f"{PLAN}/obstacles/{safe(item['name'])}" for item in _bodies(piece)]
-        nodes = (*_PATH_NODES, *own, f"{PLAN}/obstacles/workpiece")
-        yield Handle("part", "part", ("workpiece", "frame"), joint, prefix, frame, nodes)
-        prefix = prefix * frame
-    elif "frame" in path or path.get("kind") not in _SHAPES:
+    path = document["path"]
+    yield from _of_part(document, joint, prefix)
+    is_free = "workpiece" not in document
+    prefix = prefix * _frame_of_part(document)
+    if is_free and ("frame" in path or path.get("kind") not in _SHAPES):
         frame = read_pose(path.get("frame"))
         yield Handle("part", "part", ("path", "frame"), joint, prefix, frame, _PATH_NODES)
-    else:
+    elif is_free:
         start = problem.path.samples([0.0])
         pose = SE3(start.rotation[0], start.translation[0])
         yield Handle("path", "path", ("path", "start"), joint, prefix, pose, _PATH_NODES)
-    if "frame" in path:
-        prefix = prefix * read_pose(path["frame"])
+    yield from _of_waypoints(path, ("path",), "", joint, prefix)
+
+
+def _of_seams(document: Mapping[str, Any], problem: Problem) -> Iterator[Handle]:
+    """Return the handles of the part, else of all seams or of each, and of their waypoints."""
+    joint, prefix = _path_prefix(document, problem)
+    yield from _of_part(document, joint, prefix)
+    is_free = "workpiece" not in document
+    prefix = prefix * _frame_of_part(document)
+    seams = document.get("seams")
+    if isinstance(seams, Mapping):
+        if is_free:
+            frame = read_pose(seams.get("frame"))
+            yield Handle("part", "part", ("seams", "frame"), joint, prefix, frame, _PATH_NODES)
+        return
+    if not isinstance(seams, list):
+        return
+    for k, seam in enumerate(seams):
+        path, name, keys = seam["path"], str(seam["name"]), ("seams", k, "path")
+        if is_free and len(seams) <= _MOST_WAYPOINTS:
+            is_shape = path.get("kind") in _SHAPES and "frame" not in path
+            key = "start" if is_shape else "frame"
+            if not is_shape or "start" in path:
+                kind, pose = ("path" if is_shape else "part"), read_pose(path.get(key))
+                yield Handle(name, kind, (*keys, key), joint, prefix, pose)
+        yield from _of_waypoints(path, keys, f"{name}, ", joint, prefix)
+
+
+def _frame_of_part(document: Mapping[str, Any]) -> SE3:
+    return read_pose(document.get("workpiece", {}).get("frame"))
+
+
+def _of_part(document: Mapping[str, Any], joint: int, prefix: SE3) -> Iterator[Handle]:
+    piece = document.get("workpiece")
+    if piece is not None:
+        own = [f"{PLAN}/obstacles/{safe(item['name'])}" for item in _bodies(piece)]
+        nodes = (*_PATH_NODES, *own, f"{PLAN}/obstacles/workpiece")
+        frame = _frame_of_part(document)
+        yield Handle("part", "part", ("workpiece", "frame"), joint, prefix, frame, nodes)
+
+
+def _of_waypoints(
+    path: Mapping[str, Any], keys: Keys, of: str, joint: int, prefix: SE3
+) -> Iterator[Handle]:
     if path.get("kind") != "waypoints":
         return
+    if "frame" in path:
+        prefix = prefix * read_pose(path["frame"])
     key = "positions_mm" if "positions_mm" in path else "positions"
     points = np.array(path.get(key, []), dtype=np.float64) * (1e-3 if key != "positions" else 1.0)
     if points.ndim != 2 or len(points) > _MOST_WAYPOINTS:
         return
     for k, point in enumerate(points):
-        pose = SE3(np.eye(3), point)
-        keys: Keys = ("path", key, k)
-        yield Handle(f"waypoint {k + 1}", "waypoint", keys, joint, prefix, pose, turns=False)
+        pose, own = SE3(np.eye(3), point), (*keys, key, k)
+        yield Handle(f"{of}waypoint {k + 1}", "waypoint", own, joint, prefix, pose, turns=False)
 
 
 def _moved_shape(document: Mapping[str, Any], handle: Handle, pose: SE3) -> dict[Keys, Any]:
     """Return a shape that begins at a pose: its other points go along, its tool turns."""
-    path = document["path"]
+    keys = handle.keys[:-1]
+    path = at(document, keys)
     values: dict[Keys, Any] = {handle.keys: write_pose(path.get("start"), pose)}
     # Of a drag that goes on the document has moved, whatever was planned by then.
     before = handle.pose if "start" not in path else read_pose(path["start"])
@@ -162,11 +209,11 @@ def _moved_shape(document: Mapping[str, Any], handle: Handle, pose: SE3) -> dict
     for key in ("center", "center_mm"):
         if key in path:
             scale = 1e-3 if key.endswith("_mm") else 1.0
-            values["path", key] = rounded(scale * np.array(path[key], dtype=np.float64) + by, key)
+            values[(*keys, key)] = rounded(scale * np.array(path[key], dtype=np.float64) + by, key)
     if "end" in path:
         end = read_pose(path["end"])
         turn = before.rotation.T @ pose.rotation
-        values["path", "end"] = write_pose(
+        values[(*keys, "end")] = write_pose(
             path["end"], SE3(end.rotation @ turn, end.translation + by)
         )
     return values

@@ -7,78 +7,36 @@ is `plan()` of what is saved: of the ways that lead to it, nothing is left.
 
 import threading
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from selfmotion.basics import ProblemError, SelfmotionError
+from selfmotion.basics import ProblemError, Progress, SelfmotionError
 from selfmotion.model.follow import is_plain
-from selfmotion.model.motion import Trajectory
 from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, retime
-from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents import job_of
-from selfmotion.shell.replay.whole import unproved
+from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
+from selfmotion.shell.view.document import is_job
+from selfmotion.shell.view.found import Found, NewerRequest, Request
+from selfmotion.shell.view.maps import maps_soon
+from selfmotion.shell.view.motions import (
+    coarse,
+    coarse_program,
+    shown_program,
+    standing,
+    standing_program,
+)
+from selfmotion.work.job import Program
 
-# Times of a coarse motion.
-_TIMES = 41
 # What takes longer is told where nothing else is asked for in this time [s].
 _CALM = 0.25
 # So many arms are kept for documents to come: one for each place of a base that is dragged.
 _KEPT = 16
 # What the page can plan of what a document may ask for.
 GOALS = ("best", "retimed")
-
-
-@dataclass(frozen=True, eq=False)
-class Request:
-    """A document to plan.
-
-    Attributes
-    ----------
-    number : int
-        Requests are counted; the last one counts.
-    document : dict
-    """
-
-    number: int
-    document: Mapping[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What came of a request.
-
-    Attributes
-    ----------
-    request : Request
-    kind : {"coarse", "whole", "none"}
-        A first motion; the plan; or no motion at all.
-    words : str
-        The verdict, or what stops it.
-    plan : Plan or None
-        None where the document describes no problem. Without a motion, the arm standing in its
-        place, along with what it has to follow.
-    job : PlanRequest or None
-    is_brief : bool
-        Whether there is more to tell of it, which takes longer: distances, the redundancy map.
-    """
-
-    request: Request
-    kind: str
-    words: str
-    plan: Plan | None
-    job: PlanRequest | None
-    is_brief: bool = True
-
-
-class NewerRequest(BaseException):
-    """Leaves a plan that nobody waits for any more; no error, so that nothing catches it."""
 
 
 class Planning:
@@ -92,19 +50,31 @@ class Planning:
         Whether code that documents name is run.
     tell : callable
         Called in that thread with each `Found`.
+    given : (dict, Plan), optional
+        A document, and its plan that is there already.
     """
 
-    def __init__(self, file: Path, allow_code: bool, tell: Callable[[Found], None]) -> None:
+    def __init__(
+        self,
+        file: Path,
+        allow_code: bool,
+        tell: Callable[[Found], None],
+        given: tuple[Mapping[str, Any], Plan] | None = None,
+    ) -> None:
         self._file, self._allow_code, self._tell = file, allow_code, tell
         self._wanted: Request | None = None
         self._change = threading.Condition()
         self._closed = False
         self._memory: dict[str, Any] = {}
+        self._given = given
+        self._first: Found | None = None
         self.last: Plan | None = None
+        self.last_program: Program | None = None
         self._thread = threading.Thread(target=self._run, name="planning", daemon=True)
 
-    def start(self) -> None:
-        """Begin to plan what is asked for."""
+    def start(self, first: Found | None = None) -> None:
+        """Begin to plan what is asked for, and to find more of what was found first."""
+        self._first = first
         self._thread.start()
 
     def ask(self, request: Request) -> None:
@@ -122,6 +92,9 @@ class Planning:
 
     def _run(self) -> None:
         done = -1
+        if self._first is not None:
+            done = self._first.request.number
+            self._tried(self._first.request, self._first)
         while True:
             with self._change:
                 while not self._closed and (self._wanted is None or self._wanted.number == done):
@@ -130,20 +103,45 @@ class Planning:
                     return
                 request = self._wanted
             done = request.number
-            try:
-                self.answer(request)
-            except NewerRequest:
-                continue
-            except Exception as error:
-                # A fault of the program ends this plan, not the page.
-                traceback.print_exc()
-                words = f"selfmotion failed, which is a fault of the program: {error}"
-                self._tell(Found(request, "none", words, None, None))
+            self._tried(request)
 
-    def answer(self, request: Request) -> None:
-        """Tell of the motions that are found for a request."""
+    def _tried(self, request: Request, found: Found | None = None) -> None:
+        """Answer a request, where that is not `found` yet, and find more of it."""
+        try:
+            found = found or self.answer(request)
+            self._more(found)
+        except NewerRequest:
+            return
+        except Exception as error:
+            # A fault of the program ends this plan, not the page.
+            traceback.print_exc()
+            words = f"selfmotion failed, which is a fault of the program: {error}"
+            self._tell(Found(request, "none", words, None))
+
+    def answer(self, request: Request) -> Found:
+        """Tell of the motions that are found for a request; return the last one."""
         if len(self._memory) > _KEPT:
             self._memory.clear()
+        answers = self._programs if is_job(request.document) else self._plans
+        found = Found(request, "none", "", None)
+        for found in answers(request):
+            self._tell(found)
+            self._leave(request)
+        return found
+
+    def _more(self, found: Found) -> None:
+        """Tell what takes longer, where nothing newer is asked for."""
+        if found.kind != "whole" or not self._is_calm(found.request):
+            return
+        found = replace(found, is_brief=False)
+        self._tell(found)
+        maps = tuple(maps_soon(found, self._stage(found.request)))
+        if maps:
+            self._leave(found.request)
+            self._tell(replace(found, maps=maps))
+
+    def _plans(self, request: Request) -> Iterator[Found]:
+        """Yield what is found for a problem."""
         try:
             job = job_of(
                 request.document, self._file, allow_code=self._allow_code, memory=self._memory
@@ -154,31 +152,74 @@ class Planning:
                     f"{' or '.join(GOALS)} (`selfmotion plan` plans it)"
                 )
         except SelfmotionError as error:
-            self._tell(Found(request, "none", self._told(error), None, None))
+            yield Found(request, "none", self._told(error), None)
             return
-        coarse = self._coarse(job.problem)
-        self._leave(request)
-        if coarse is not None:
-            self._tell(Found(request, "coarse", coarse.report.message, coarse, job))
-        self._leave(request)
+        if self._given is not None and self._given[0] == request.document:
+            self.last = found = self._given[1]
+            yield Found(request, "whole", found.certificate.verdict, found)
+            return
+        first = self._coarse(job.problem)
+        if first is not None:
+            yield Found(request, "coarse", first.report.message, first)
         try:
             found = self._whole(request, job)
         except SelfmotionError as error:
             words = f"not verified: {self._told(error)}"
-            stands = standing(job.problem, self.last, words)
-            self._tell(Found(request, "none", words, stands, job))
+            yield Found(request, "none", words, standing(job.problem, self.last, words))
             return
         self.last = found
-        told = Found(request, "whole", found.certificate.verdict, found, job)
-        self._tell(told)
-        if self._is_calm(request):
-            self._tell(replace(told, is_brief=False))
+        yield Found(request, "whole", found.certificate.verdict, found)
+
+    def _programs(self, request: Request) -> Iterator[Found]:
+        """Yield what is found for a job.
+
+        The program before is planned anew where it has to be, which is soon there; then the best
+        one from nothing, as `selfmotion job` does.
+        """
+        try:
+            job = seam_job_of(
+                request.document, self._file, allow_code=self._allow_code, memory=self._memory
+            )
+        except SelfmotionError as error:
+            yield Found(request, "none", self._told(error), None)
+            return
+        before = self.last_program
+        if before is not None and before.robot.joint_names == job.robot.joint_names:
+            first = coarse_program(job, before)
+            yield Found(request, "coarse", first.verdict, first.plan, first)
+            early = self._early(request, job, before)
+            if early is not None:
+                words = f"{early.verdict}; the best order is being looked for"
+                shown = shown_program(early)
+                yield Found(request, "early", words, shown.plan, shown, early)
+        try:
+            found = job.plan(progress=self._stage(request))
+        except SelfmotionError as error:
+            words = f"not verified: {self._told(error)}"
+            shown = standing_program(job, before, words)
+            paths = tuple(seam.path for seam in job.seams)
+            yield Found(request, "none", words, shown.plan, shown, unmade=paths)
+            return
+        self.last_program = found
+        shown = shown_program(found)
+        unmade = tuple(seam.path for seam in job.seams if seam.name in found.missing)
+        yield Found(request, "whole", found.verdict, shown.plan, shown, found, unmade)
+
+    def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:
+        """Return a verified program in the order before; None where there is none."""
+        if job.at_feed is not None or not before.verified:
+            return None
+        try:
+            found = job.plan(warm_start=before, progress=self._stage(request))
+        except SelfmotionError:
+            # Planned from nothing it is told what is wrong.
+            return None
+        return found if found.verified else None
 
     def _is_calm(self, request: Request) -> bool:
         """Wait a moment; return whether nothing newer is asked for by then."""
         with self._change:
-            if self._thread.is_alive():
-                self._change.wait(_CALM)
+            self._change.wait(_CALM)
         return not self._closed and (self._wanted is None or self._wanted.number == request.number)
 
     def _coarse(self, problem: Problem) -> Plan | None:
@@ -191,15 +232,20 @@ class Planning:
         return coarse(problem, last.trajectory)
 
     def _whole(self, request: Request, job: PlanRequest) -> Plan:
-        def stage(_: str, __: int, ___: int) -> None:
-            self._leave(request)
-
         def iteration(_: Iteration) -> bool:
             self._leave(request)
             return False
 
-        found = plan(job.problem, progress=stage, callback=iteration, **job.settings)
+        found = plan(job.problem, progress=self._stage(request), callback=iteration, **job.settings)
         return retime(found) if job.goal == "retimed" else found
+
+    def _stage(self, request: Request) -> Progress:
+        """Return what leaves a request at the next stage of its plan."""
+
+        def stage(_: str, __: int, ___: int) -> None:
+            self._leave(request)
+
+        return stage
 
     def _leave(self, request: Request) -> None:
         wanted = self._wanted
@@ -208,41 +254,3 @@ class Planning:
 
     def _told(self, error: SelfmotionError) -> str:
         return str(error).removeprefix(f"{self._file}: ")
-
-
-def coarse(problem: Problem, before: Trajectory) -> Plan:
-    """Return the motion before, put onto the path of a problem time by time; nothing is proved.
-
-    Its message says where it cannot be: where Newton's method finds no configuration near, which
-    stays where it was then.
-    """
-    robot, follows, path = problem.robot, problem.follows, problem.path
-    share = np.linspace(0.0, 1.0, _TIMES)
-    times = share * path.duration
-    near = before(before.t[0] + share * (before.t[-1] - before.t[0]))
-    manifold = Manifold(follows, robot.lower, robot.upper)
-    reached, arrived = manifold.project(near, follows.targets(times), held=follows.held(times))
-    q = np.where(arrived[:, None], reached, near)
-    motion = Trajectory(times, q, np.gradient(q, times, axis=0), robot.joint_names)
-    words = "planning …"
-    if not arrived.all():
-        words = (
-            f"planning …; out of reach near the motion before, from t = {times[~arrived][0]:.3g} s"
-        )
-    return unproved(problem, motion, words)
-
-
-def standing(problem: Problem, last: Plan | None, words: str) -> Plan:
-    """Return a plan in which the arm stands, for a page that has no motion to show.
-
-    It stands where the motion before began, else where the problem does; its certificate says why.
-    """
-    robot, duration = problem.robot, problem.path.duration
-    q = robot.home
-    if problem.given_start is not None:
-        q = problem.given_start
-    elif last is not None and last.robot.joint_names == robot.joint_names:
-        q = last.trajectory.q[0]
-    still = np.tile(q, (2, 1))
-    motion = Trajectory(np.array([0.0, duration]), still, np.zeros_like(still), robot.joint_names)
-    return unproved(problem, motion, words)

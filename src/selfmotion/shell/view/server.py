@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from selfmotion.basics import RenderError, SelfmotionError
-from selfmotion.shell.view.session import Session
+from selfmotion.shell.view.sitting import Sitting
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -41,7 +41,7 @@ def check_server() -> None:
 
 
 def serve(
-    session: Session,
+    session: Sitting,
     *,
     port: int = 0,
     opens: bool = True,
@@ -51,7 +51,7 @@ def serve(
 
     Parameters
     ----------
-    session : Session
+    session : Sitting
     port : int
         0 for a free one.
     opens : bool
@@ -113,7 +113,7 @@ def configuration(app: "Starlette") -> Any:
     )
 
 
-def application(session: Session, token: str, port: int) -> "Starlette":
+def application(session: Sitting, token: str, port: int) -> "Starlette":
     """Return the application: the page, its connection, and the exported files."""
     from starlette.applications import Starlette
     from starlette.requests import Request
@@ -151,7 +151,7 @@ def application(session: Session, token: str, port: int) -> "Starlette":
         except SelfmotionError as error:
             return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
         # Headers are Latin-1: other letters of the name are told as those of an address are.
-        name = quote(f"{session.edited.file.stem}{suffix}", safe="", errors="replace")
+        name = quote(f"{session.file.stem}{suffix}", safe="", errors="replace")
         headers = {**_HEADERS, "Content-Disposition": f"attachment; filename*=UTF-8''{name}"}
         return Response(data, media_type="application/octet-stream", headers=headers)
 
@@ -191,7 +191,7 @@ _HEADERS = {
 
 
 async def _both(
-    connection: "WebSocket", session: Session, outgoing: "asyncio.Queue[bytes]"
+    connection: "WebSocket", session: Sitting, outgoing: "asyncio.Queue[bytes]"
 ) -> None:
     """Hear and tell at the same time, until the page is closed."""
     hearing = asyncio.create_task(_hear(connection, session))
@@ -204,7 +204,7 @@ async def _both(
         task.result()
 
 
-async def _hear(connection: "WebSocket", session: Session) -> None:
+async def _hear(connection: "WebSocket", session: Sitting) -> None:
     from starlette.websockets import WebSocketDisconnect
 
     while True:

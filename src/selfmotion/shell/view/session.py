@@ -1,40 +1,38 @@
-"""One sitting at the page: the document, its planner, and what is told to the page."""
+"""A sitting at a page that changes a document while its plan follows."""
 
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import PlanError, ProblemError, SelfmotionError, shown as told
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json
-from selfmotion.shell.replay.page import live_html
-from selfmotion.shell.view.document import Edited
+from selfmotion.shell.view.document import Edited, EditedPlan
+from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.handles import Handle, dragged, handles_of
-from selfmotion.shell.view.planning import Found, Planning, Request
-from selfmotion.shell.view.shown import Shown
+from selfmotion.shell.view.planning import Planning
+from selfmotion.shell.view.sitting import Sitting
 from selfmotion.shell.view.sliders import Slider, sliders_of
-from selfmotion.shop.controllers import write_motion
 
-# Files that motions are exported to, by suffix.
-EXPORTS = (".npz", ".csv", ".json", ".yaml", ".xml", ".script", ".src", ".mod")
 # How far a matrix of the page may be from a pose.
 _RIGID = 1e-3
 # No page gives this number to what it asks.
 _NOTHING = -1
 
 
-class Session:
+class Session(Sitting):
     """A document that is changed on a page while its plan follows.
 
     Parameters
     ----------
     file : Path
-        A problem file.
+        A problem file or a job file; or a plan's.
+    edited : Edited, optional
+        The document; by default what the file says.
     allow_code : bool
         Whether code that it names is run.
 
@@ -44,72 +42,48 @@ class Session:
         The file cannot be read, or is no problem that the page can plan.
     """
 
-    def __init__(self, file: Path, *, allow_code: bool = False) -> None:
-        self.edited = Edited(file)
+    def __init__(
+        self, file: Path, edited: Edited | None = None, *, allow_code: bool = False
+    ) -> None:
+        super().__init__(file)
+        self.edited = Edited(file) if edited is None else edited
         self._begun = dict(self.edited.document)
         self._number = self._mark = 0
-        self._found: Found | None = None
         # The last plan of a document that describes a problem, and what of that can be changed.
         self._known: Plan | None = None
         self._handles: dict[str, Handle] = {}
         self._sliders: dict[str, Slider] = {}
-        self._send: Callable[[bytes], None] | None = None
-        self._lock, self._telling = threading.RLock(), threading.Lock()
-        self._planning = Planning(file, allow_code, self._take)
-        plan = self._first_plan()
+        given = None
+        if isinstance(self.edited, EditedPlan):
+            given = self.edited.document, self.edited.plan
+        self._planning = Planning(file, allow_code, self._take, given)
+        # Before there is a page; what is no problem at all is told at once.
+        first = self._planning.answer(Request(0, self.edited.document))
+        self.open(first)
         self._sliders = sliders_of(self.edited.document, self._begun)
-        self._html, radius = live_html(plan, title=file.name)
-        self._shown = Shown(radius, plan.robot)
-        self._planning.start()
-
-    def _first_plan(self) -> Plan:
-        """Plan before there is a page; what is no problem at all is told at once."""
-        self._planning.answer(Request(0, self.edited.document))
-        if self._known is None:
-            words = "" if self._found is None else self._found.words
-            raise ProblemError(f"{self.edited.file}: {words}")
-        return self._known
+        self._planning.start(first)
 
     @property
-    def found(self) -> Found | None:
-        """What was found last."""
-        return self._found
+    @override
+    def saves(self) -> str:
+        return self.edited.saves
 
-    @property
-    def html(self) -> str:
-        """The page, with the plan that was made first."""
-        return self._html
-
+    @override
     def close(self) -> None:
-        """End the planner."""
         self._planning.close()
 
     # The page, and what it asks for.
 
+    @override
     def attach(self, send: Callable[[bytes], None]) -> bool:
-        """Tell a page from now on what is found; False where there is one already."""
         with self._lock:
-            if self._send is not None:
-                return False
-            self._send = send
-            # Another page counts anew.
-            self._mark = 0
-        self._tell()
-        return True
+            if self._send is None:
+                # Another page counts anew.
+                self._mark = 0
+        return super().attach(send)
 
-    def detach(self) -> None:
-        """Let another page come."""
-        with self._lock:
-            self._send = None
-
+    @override
     def answer(self, asked: Any) -> Json | None:
-        """Do what a page asks for; what it is to be told at once, or None.
-
-        Raises
-        ------
-        SelfmotionError
-            It cannot be done; the document is as before.
-        """
         if not isinstance(asked, Mapping):
             raise ProblemError(f"the page asks for {told(asked)}, expected a table")
         mark = asked.get("mark", 0)
@@ -122,7 +96,7 @@ class Session:
         except SelfmotionError:
             # The plan of what was asked for before answers this, too.
             if is_new:
-                self._tell()
+                self.tell()
             raise
 
     def _done(self, asked: Mapping[str, Any]) -> Json | None:
@@ -135,8 +109,8 @@ class Session:
                 self.edited.undo()
                 self._ask()
             case "save":
-                self.edited.save()
-                return {"saved": True, **self._state}
+                self._save()
+                return {"saved": f"Saved {self.edited.saves}.", **self._state()}
             case other:
                 raise ProblemError(
                     f"the page asks for {told(other)}, expected drag, slide, undo or save"
@@ -170,30 +144,13 @@ class Session:
             f"there is no {told(asked.get('name'))} in this document, which has {', '.join(known)}"
         )
 
-    def export(self, suffix: str) -> bytes:
-        """Return the motion as a file for a controller, or as a plan's own file (.npz).
-
-        Raises
-        ------
-        ProblemError
-            The suffix is of no format.
-        PlanError
-            What is shown is not verified, or is being planned.
-        """
-        if suffix not in EXPORTS:
-            raise ProblemError(f"{suffix}: is no format, expected one of {', '.join(EXPORTS)}")
-        found = self._found
-        if found is None or found.plan is None or found.request.number != self._number:
-            raise PlanError("what is shown is being planned; wait for its verdict, then export")
-        if not found.plan.certificate.verified:
-            raise PlanError(f"{found.words}; nothing is exported until it is verified")
-        with TemporaryDirectory(prefix="selfmotion-") as folder:
-            file = Path(folder) / f"{self.edited.file.stem}{suffix}"
-            if suffix == ".npz":
-                found.plan.save(file)
-            else:
-                write_motion(found.plan, file)
-            return file.read_bytes()
+    def _save(self) -> None:
+        if isinstance(self.edited, EditedPlan):
+            found = self.current("saved")
+            if found.plan is None or found.kind == "none":
+                raise PlanError(f"{found.words}; there is no plan to be saved")
+            self.edited.plan = found.plan
+        self.edited.save()
 
     # The planner.
 
@@ -201,7 +158,7 @@ class Session:
         self._number += 1
         self._planning.ask(Request(self._number, self.edited.document))
 
-    @property
+    @override
     def _state(self) -> Json:
         edited = self.edited
         self._sliders = sliders_of(edited.document, self._begun)
@@ -217,25 +174,16 @@ class Session:
             if found.plan is not None:
                 self._known = found.plan
                 self._handles = handles_of(found.request.document, found.plan.problem)
-        self._tell()
+        self.tell()
 
-    def _tell(self) -> None:
-        """Tell the page of what was found last."""
-        # One after the other, so that an older message never comes last.
-        with self._telling:
-            with self._lock:
-                found, send = self._found, self._send
-                if found is None or send is None:
-                    return
-                state = {**self._state, "answers": self._answered(found)}
-            # The page may go on to ask while this is made.
-            send(self._shown.message(found, state))
+    @override
+    def _is_current(self, found: Found) -> bool:
+        return super()._is_current(found) and found.request.number == self._number
 
+    @override
     def _answered(self, found: Found) -> int:
-        """Return the number of what a page asked that is answered; that of nothing for older ones.
-
-        The last document answers whatever was asked last, whichever page had asked for it.
-        """
+        # The last document answers whatever was asked last, whichever page had asked for it; older
+        # ones nothing.
         return self._mark if found.request.number == self._number else _NOTHING
 
 

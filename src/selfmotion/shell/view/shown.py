@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.result import Plan
+from selfmotion.planning.result import Parts, Plan
 from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.content import plan_content
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.redundancy import tree
+from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.handles import PLAN, handles_of
-from selfmotion.shell.view.planning import Found
 
 # The node below which what stops a plan is drawn, in red, where its path is; tubes and balls are
 # relative to the scene.
@@ -24,19 +25,16 @@ _TRIADS = 7
 
 
 class Shown:
-    """Makes the messages of a page; what the page has already is not said again.
+    """Makes the messages of a page; what the page has already is not said again."""
 
-    Parameters
-    ----------
-    radius : float
-        Half the size of the scene, as the page was made [m].
-    robot : RobotModel
-        The arm as the page was made.
-    """
-
-    def __init__(self, radius: float, robot: RobotModel) -> None:
-        self._radius, self._robot = radius, robot
+    def __init__(self) -> None:
+        self._radius = 1.0
+        self._robot: RobotModel | None = None
         self._has_changed = False
+
+    def begin(self, radius: float, robot: RobotModel) -> None:
+        """Note half the size of the scene [m], and the arm, as the page is made with them."""
+        self._radius, self._robot = radius, robot
 
     def message(self, found: Found, state: Json) -> bytes:
         """Return what was found, and the state of the document, as the page reads them."""
@@ -48,27 +46,36 @@ class Shown:
             "brief": found.is_brief,
             **state,
         }
-        if found.plan is not None:
-            content |= self._plan(
-                found.plan, payload, brief=found.is_brief, is_coarse=found.kind == "coarse"
+        plan = found.plan
+        if plan is not None:
+            content |= plan_content(
+                plan,
+                "plan",
+                payload,
+                radius=self._radius,
+                triads=_TRIADS if found.whole is None else 0,
+                whole=found.whole,
+                brief=found.is_brief,
+                maps=found.maps,
             )
-            content |= {"handles": handles_json(found.request.document, found.plan)}
+            if found.kind != "coarse" and not found.verified:
+                content["stopped"] = list(stopping(found, payload, self._radius))
+            content |= self._arm(plan, payload)
+            content["handles"] = handles_json(found.request.document, plan)
         return payload.data(content)
 
-    def _plan(self, plan: Plan, payload: Payload, *, brief: bool, is_coarse: bool) -> Json:
-        content = plan_content(
-            plan, "plan", payload, radius=self._radius, triads=_TRIADS, brief=brief
-        )
-        if not (is_coarse or plan.certificate.verified):
-            content["stopped"] = list(stopping(plan, payload, self._radius))
+    def _arm(self, plan: Plan, payload: Payload) -> Json:
+        """Return the arm, where it is another one than the page was made with."""
         # A page may miss a message when the next one is there: all that come later say it, too.
         self._has_changed |= plan.robot is not self._robot
-        if self._has_changed:
-            # Meshes are those that the page has: they have the same numbers again.
-            arm = links.bake(plan.robot, Payload())
-            content["tree"] = tree(plan.robot, payload)
-            content["arm"] = links.arm_commands(plan.robot, arm)
-        return content
+        if not self._has_changed:
+            return {}
+        # Meshes are those that the page has: they have the same numbers again.
+        arm = links.bake(plan.robot, Payload())
+        return {
+            "tree": tree(plan.robot, payload),
+            "arm": links.arm_commands(plan.robot, arm),
+        }
 
 
 def handles_json(document: Mapping[str, Any], plan: Plan) -> list[Json]:
@@ -77,29 +84,54 @@ def handles_json(document: Mapping[str, Any], plan: Plan) -> list[Json]:
     return [handle.json(plan.robot) for handle in handles.values()]
 
 
-def stopping(plan: Plan, payload: Payload, radius: float) -> Iterator[Json]:
-    """Return the commands that draw in red what stops a plan.
+def stopping(found: Found, payload: Payload, radius: float) -> Iterator[Json]:
+    """Return the commands that draw in red what stops a motion.
 
-    What of the path no motion reaches, and where the tool is when a requirement is not kept.
+    What of the paths no motion reaches, and where the tool is when a requirement is not kept.
     """
+    if found.plan is None:
+        return
+    base = found.plan.problem.follows.items[0].chain.base_placement
+    ends, places = list[Array](), list[Array]()
+    for number, (path, reached, times) in enumerate(_stopped(found)):
+        if reached < path.duration:
+            points = _in_frame(base, path.samples(np.linspace(reached, path.duration, _POINTS)))
+            kept = three.distinct(points, 0.5 * _TUBE * radius)
+            if len(kept) > 1:
+                tube = three.tube(points[kept], _TUBE * radius)
+                yield _red(f"path{number}", payload, tube)
+            ends.append(points[0])
+        if times:
+            within = np.clip(times, 0.0, path.duration)
+            places += list(_in_frame(base, path.samples(within)))
+    for name, some in (("end", ends), ("places", places)):
+        if some:
+            yield _red(name, payload, three.beads(np.array(some), _BALL * radius))
+
+
+def _stopped(found: Found) -> Iterator[tuple[Path, float, list[float]]]:
+    """Return paths, until when they are followed, and when something is not kept [s]."""
+    for path in found.unmade:
+        yield path, 0.0, []
+    made = found.made
+    if made is not None:
+        plans = made.plans if isinstance(made, Parts) else made.plans.values()
+        for plan in plans:
+            yield plan.path, plan.path.duration, _not_kept(plan)
+    elif found.plan is not None and found.whole is None:
+        plan = found.plan
+        stands = np.ptp(plan.trajectory.q, axis=0).max() == 0.0
+        reached = 0.0 if stands else min(plan.trajectory.duration, plan.path.duration)
+        yield plan.path, reached, [time for time in _not_kept(plan) if time <= reached]
+
+
+def _not_kept(plan: Plan) -> list[float]:
+    return [item.time for item in plan.certificate.findings if not item.satisfied]
+
+
+def _red(name: str, payload: Payload, surface: Any) -> Json:
     look = three.material(_RED, roughness=0.9)
-    path, follow = plan.problem.path, plan.problem.follows.items[0]
-    base = follow.chain.base_placement
-    stands = np.ptp(plan.trajectory.q, axis=0).max() == 0.0
-    reached = 0.0 if stands else min(plan.trajectory.duration, path.duration)
-    if reached < path.duration:
-        points = _in_frame(base, path.samples(np.linspace(reached, path.duration, _POINTS)))
-        kept = three.distinct(points, 0.5 * _TUBE * radius)
-        if len(kept) > 1:
-            tube = three.tube(points[kept], _TUBE * radius)
-            yield three.set_object(f"{STOPPED}/path", scene.triangles(payload, *tube), look)
-        beads = three.beads(points[:1], _BALL * radius)
-        yield three.set_object(f"{STOPPED}/end", scene.triangles(payload, *beads), look)
-    times = [f.time for f in plan.certificate.findings if not f.satisfied and f.time <= reached]
-    if times:
-        points = _in_frame(base, path.samples(np.clip(times, 0.0, path.duration)))
-        beads = three.beads(points, _BALL * radius)
-        yield three.set_object(f"{STOPPED}/places", scene.triangles(payload, *beads), look)
+    return three.set_object(f"{STOPPED}/{name}", scene.triangles(payload, *surface), look)
 
 
 def _in_frame(base: Any, samples: Any) -> Array:

@@ -21,6 +21,8 @@ _OF_TOLERANCE = {
     "rotation": ("tolerance of rotation", "rad"),
     "rotation_deg": ("tolerance of rotation", "°"),
 }
+# Of more seams none has a slider of its own.
+_MOST_SEAMS = 12
 _WEIGHTS = ("weight", "mu")
 
 
@@ -67,8 +69,9 @@ def sliders_of(document: Mapping[str, Any], begun: Mapping[str, Any]) -> dict[st
 
 
 def _sliders(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[Slider]:
-    for key, (name, unit) in _OF_PATH.items():
-        yield from _about(document, begun, ("path", key), name, unit)
+    for keys, of in _paced(document):
+        for key, (name, unit) in _OF_PATH.items():
+            yield from _about(document, begun, (*keys, key), f"{name}{of}", unit)
     yield from _clearance(document, begun)
     for key, (name, unit) in _OF_TOLERANCE.items():
         yield from _about(document, begun, ("tolerance", key), name, unit)
@@ -81,6 +84,18 @@ def _sliders(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[
         name = f"weight of {item.get('name', item['kind'])}"
         for key in _WEIGHTS:
             yield from _about(document, begun, ("costs", k, key), name, "")
+
+
+def _paced(document: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+    """Return the tables that say how fast a path is, and how their sliders are told apart."""
+    seams = document.get("seams")
+    if isinstance(seams, list):
+        if len(seams) <= _MOST_SEAMS:
+            yield from (
+                (("seams", k, "path"), f" of {seams[k]['name']}") for k in range(len(seams))
+            )
+    else:
+        yield ("path",) if seams is None else ("seams",), ""
 
 
 def _about(

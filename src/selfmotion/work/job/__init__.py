@@ -8,7 +8,12 @@ from selfmotion.work.job.highest_feed import (
 )
 from selfmotion.work.job.program import Program as Program, write_timetable as write_timetable
 from selfmotion.work.job.run import plan_job as plan_job
-from selfmotion.work.job.seam import Seam as Seam, Step as Step, are_opposite as are_opposite
+from selfmotion.work.job.seam import (
+    Seam as Seam,
+    Step as Step,
+    are_opposite as are_opposite,
+    backwards as backwards,
+)
 from selfmotion.work.job.specification import Specification as Specification
 
 __all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

@@ -1,6 +1,6 @@
 // The page while its problem is changed: what is asked of the server, and what it tells.
 
-const TOLD = ["cost", "limits used fully", "margin to a joint limit, least", "speed, most", "duration"];
+const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to a joint limit, least", "speed, most", "duration"];
 // How the server ends a connection: without the token, and where another tab has the page.
 const REFUSED = 4403;
 const TAKEN = 4409;
@@ -14,8 +14,14 @@ class Live {
     this.sliders = new Map();
     // What was asked is counted; what is shown answers one of these.
     this.asked = this.answered = 0;
+    const { saves, why, exports } = page.content.live;
     document.documentElement.classList.add("live");
     get("change").hidden = false;
+    // What is only looked at has nothing to be changed.
+    get("change").classList.toggle("fixed", !saves);
+    get("save").title = `Writes ${saves}`;
+    for (const [value, name] of exports) element(get("export"), "option", { value }, name);
+    if (!saves) this.say(why);
     if (page.stage) {
       this.handles = new Handles(page.stage, page.content.radius,
         (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
@@ -78,7 +84,7 @@ class Live {
       this.say(answer.error, true);
       return;
     }
-    if (answer.saved) this.say("Saved.");
+    if (answer.saved) this.say(answer.saved);
     this.state(answer);
   }
 
@@ -105,6 +111,7 @@ class Live {
     }
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
+    if (brief) get("maps").classList.add("stale");
     document.documentElement.dataset.brief = brief;
     this.judge(message);
   }
@@ -113,12 +120,14 @@ class Live {
   judge(message) {
     this.last = message;
     const open = message.kind === "coarse" || this.answered !== this.asked;
-    const verified = message.kind === "whole" && message.plans[0].verified && !open;
+    const verified = message.plans?.[0].verified && !open;
     get("verdict").textContent = open && message.kind !== "coarse" ? "planning …" : message.words;
     get("verdict").className = open ? "coarse" : verified ? "verified" : "";
     get("figures").classList.toggle("stale", open);
     this.page.stage?.setGrey(!verified);
-    document.documentElement.dataset.live = open ? "coarse" : verified ? "verified" : "stopped";
+    // A program in the order before is verified, and not the last word.
+    document.documentElement.dataset.live = open ? "coarse" : !verified ? "stopped"
+      : message.kind === "early" ? "early" : "verified";
   }
 
   drawNumbers(table) {
@@ -127,8 +136,8 @@ class Live {
     get("figures").replaceChildren();
     for (const { label, cells: [[value, note]] } of rows) {
       element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
-      const cell = element(get("figures"), "dd", {}, value);
-      if (note) element(cell, "small", {}, ` ${note}`);
+      // Where and when is in the table below: here the numbers leave room for the map.
+      element(get("figures"), "dd", note ? { title: note } : {}, value);
     }
   }
 

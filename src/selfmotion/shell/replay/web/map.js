@@ -15,6 +15,40 @@ function shade(colors, share) {
   return colors[k].map((value, i) => value + (place - k) * (colors[k + 1][i] - value));
 }
 
+// The maps of a plan, or of a job's seams, with their slices: one of them is shown at a time.
+class Maps {
+  constructor(parent, seams, onSeek, onStand) {
+    Object.assign(this, { parent, seams, onSeek, onStand });
+    this.show(seams[0]);
+  }
+
+  show(seam) {
+    this.map?.remove();
+    this.seam = seam;
+    const { begin, name, slices } = seam;
+    // The slice that was chosen stays the one that is shown, in other plans and seams, too.
+    const slice = slices.find(({ label }) => label === Maps.chosen) ?? slices[0];
+    this.map = new RedundancyMap(this.parent, { ...slice, name, choices: slices.length }, (time) => this.onSeek(begin + time), this.onStand);
+    if (slices.length < 2) return;
+    const choice = element(this.map.caption, "select", { "aria-label": "Slice along" });
+    for (const { label } of slices) element(choice, "option", label === slice.label ? { selected: "" } : {}, label);
+    choice.addEventListener("change", () => {
+      Maps.chosen = choice.value;
+      this.show(seam);
+      this.seek(this.time);
+    });
+  }
+
+  seek(time) {
+    this.time = time;
+    const seam = this.seams.findLast(({ begin }) => begin <= time + 1e-6) ?? this.seams[0];
+    if (seam !== this.seam) this.show(seam);
+    this.map.seek(Math.max(time - seam.begin, 0));
+  }
+
+  remove() { this.map.remove(); }
+}
+
 class RedundancyMap extends Figure {
   constructor(parent, data, onSeek, onStand) {
     super();
@@ -23,9 +57,11 @@ class RedundancyMap extends Figure {
     this.onStand = onStand;
     this.time = 0;
     this.figure = element(parent, "figure", { class: "map" });
-    const caption = element(this.figure, "figcaption");
-    element(caption, "span", {}, `Redundancy map: ${this.label} [${this.unit}]`);
-    element(caption, "span", { class: "at" }, `${this.slice ? "a slice; " : ""}click: stand there`);
+    this.caption = element(this.figure, "figcaption");
+    const of = this.name ? ` of ${this.name}` : "";
+    const along = this.slice && this.choices > 1 ? "" : `: ${this.label}`;
+    element(this.caption, "span", {}, `Redundancy map${of}${along} [${this.unit}]`);
+    element(this.caption, "span", { class: "at" }, `${this.slice ? "a slice; " : ""}click: stand there`);
     const frame = element(this.figure, "div", { class: "frame" });
     this.canvas = element(frame, "canvas", { width: this.t.length, height: this.values.length });
     this.svg = element(frame, "svg", { role: "img", "aria-label": `What stops the arm, by time and ${this.label}` });

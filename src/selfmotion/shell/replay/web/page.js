@@ -396,11 +396,16 @@ class Page {
   // Plots and table
 
   makePlots() {
-    for (const plot of this.plots) plot.remove();
     const seek = (time) => { this.pause(); this.seek(time); };
     const { redundancy, events } = this.plan;
-    const map = redundancy ? [new RedundancyMap(get("plots"), redundancy, seek, (q, cause) => this.stand(q, cause))] : [];
-    this.plots = [...map, ...plotSpecs(this.content, this.plan).map((spec, id) => new Plot(get("plots"), { ...spec, id, events }, seek))];
+    // A page that plans has its maps beside the scene, and the older ones until others are there.
+    const home = this.content.live ? get("maps") : get("plots");
+    const older = this.content.live && this.plan.verified && !redundancy.length ? this.maps : undefined;
+    for (const plot of this.plots) if (plot !== older) plot.remove();
+    get("maps").classList.toggle("stale", older !== undefined);
+    this.maps = older ?? (redundancy.length ? new Maps(home, redundancy, seek, (q, cause) => this.stand(q, cause)) : undefined);
+    this.plots = [...(this.maps ? [this.maps] : []),
+      ...plotSpecs(this.content, this.plan).map((spec, id) => new Plot(get("plots"), { ...spec, id, events }, seek))];
   }
 
   // What a program consists of: a button for each step, which leads to its begin.

@@ -1,0 +1,74 @@
+"""What the planner of the page is asked for, and what it finds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from selfmotion.model.path import Path
+from selfmotion.planning.result import Parts, Plan
+from selfmotion.shell.replay.redundancy import SeamMaps
+from selfmotion.shell.replay.whole import Whole
+from selfmotion.work.job import Program
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """A document to plan.
+
+    Attributes
+    ----------
+    number : int
+        Requests are counted; the last one counts.
+    document : dict
+    """
+
+    number: int
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What came of a request.
+
+    Attributes
+    ----------
+    request : Request
+    kind : {"coarse", "early", "whole", "none"}
+        A first motion; of a job a program in the order before; what is planned; no motion at all.
+    words : str
+        The verdict, or what stops it.
+    plan : Plan or None
+        None where the document describes no problem. Without a motion, the arm standing in its
+        place, along with what it has to follow. Of several seams what stands for them.
+    whole : Whole or None
+        Of several seams.
+    made : Program, Parts or None
+        What that is of: a job's program, or a motion in parts.
+    unmade : tuple of Path
+        Of a job the paths of the seams that are not made.
+    maps : tuple of SeamMaps
+        Redundancy maps, when they are made.
+    is_brief : bool
+        Whether there is more to tell of it, which takes longer: distances, the redundancy map.
+    """
+
+    request: Request
+    kind: str
+    words: str
+    plan: Plan | None
+    whole: Whole | None = None
+    made: Program | Parts | None = None
+    unmade: tuple[Path, ...] = ()
+    maps: tuple[SeamMaps, ...] = ()
+    is_brief: bool = True
+
+    @property
+    def verified(self) -> bool:
+        """Whether it is a motion that is verified."""
+        if self.whole is not None:
+            return self.whole.verified
+        return self.plan is not None and self.plan.certificate.verified
+
+
+class NewerRequest(BaseException):
+    """Leaves a plan that nobody waits for any more; no error, so that nothing catches it."""

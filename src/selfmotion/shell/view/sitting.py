@@ -1,0 +1,174 @@
+"""One sitting at the page: what is shown, to whom, and what of it is exported."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from selfmotion.basics import PlanError, ProblemError
+from selfmotion.planning.result import Parts
+from selfmotion.shell.replay.meshes import Json
+from selfmotion.shell.replay.page import live_html
+from selfmotion.shell.view.found import Found
+from selfmotion.shell.view.shown import Shown
+from selfmotion.shop.controllers import write_motion
+
+# Files that motions are exported to, by suffix, and how the page calls them.
+_OF_MOTIONS = {
+    ".csv": "CSV",
+    ".json": "JSON",
+    ".yaml": "ROS 2 (.yaml)",
+    ".xml": "MuJoCo (.xml)",
+    ".script": "URScript",
+    ".src": "KUKA (.src)",
+    ".mod": "ABB (.mod)",
+}
+_OF_PLANS = {".npz": "plan (.npz)", **_OF_MOTIONS}
+_OF_PROGRAMS = {".program": "program (.program)", **_OF_MOTIONS}
+_OF_PARTS = {".parts": "parts (.parts)", **_OF_MOTIONS}
+# Files that are read again with all that they hold.
+_OWN = (".npz", ".program", ".parts")
+
+
+class Sitting:
+    """A page that shows what a file holds, and has nothing to be changed.
+
+    Parameters
+    ----------
+    file : Path
+    why : str
+        Why nothing can be changed.
+    """
+
+    def __init__(self, file: Path, why: str = "") -> None:
+        self.file, self._why = file, why
+        self._found: Found | None = None
+        self._html, self._shown = "", Shown()
+        self._send: Callable[[bytes], None] | None = None
+        self._lock, self._telling = threading.RLock(), threading.Lock()
+
+    def open(self, found: Found) -> None:
+        """Make the page, with what there is to show first.
+
+        Raises
+        ------
+        ProblemError
+            That is nothing.
+        """
+        if found.plan is None:
+            raise ProblemError(f"{self.file}: {found.words}")
+        self._found = found
+        live = {"exports": list(self.exports.items()), "saves": self.saves, "why": self._why}
+        self._html, radius = live_html(
+            found.plan, title=self.file.name, whole=found.whole, live=live
+        )
+        self._shown.begin(radius, found.plan.robot)
+
+    @property
+    def found(self) -> Found | None:
+        """What was found last."""
+        return self._found
+
+    @property
+    def html(self) -> str:
+        """The page, with what was found first."""
+        return self._html
+
+    @property
+    def saves(self) -> str:
+        """What is written when the page saves, in words; "" where nothing can be changed."""
+        return ""
+
+    @property
+    def exports(self) -> dict[str, str]:
+        """Files that the motion can be exported to: their suffixes, and how they are called."""
+        found = self._found
+        if found is None or found.whole is None:
+            return _OF_PLANS
+        return _OF_PARTS if isinstance(found.made, Parts) else _OF_PROGRAMS
+
+    def close(self) -> None:
+        """End what works for the page."""
+
+    def attach(self, send: Callable[[bytes], None]) -> bool:
+        """Tell a page from now on what is found; False where there is one already."""
+        with self._lock:
+            if self._send is not None:
+                return False
+            self._send = send
+        self.tell()
+        return True
+
+    def detach(self) -> None:
+        """Let another page come."""
+        with self._lock:
+            self._send = None
+
+    def answer(self, asked: Any) -> Json | None:
+        """Do what a page asks for; what it is to be told at once, or None.
+
+        Raises
+        ------
+        SelfmotionError
+            It cannot be done; the document is as before.
+        """
+        del asked
+        raise ProblemError(f"{self.file}: {self._why}")
+
+    def tell(self) -> None:
+        """Tell the page of what was found last."""
+        # One after the other, so that an older message never comes last.
+        with self._telling:
+            with self._lock:
+                found, send = self._found, self._send
+                if found is None or send is None:
+                    return
+                state = {**self._state(), "answers": self._answered(found)}
+            # The page may go on to ask while this is made.
+            send(self._shown.message(found, state))
+
+    def _state(self) -> Json:
+        return {"sliders": [], "changed": False, "undo": False}
+
+    def _answered(self, found: Found) -> int:
+        """Return the number of what a page asked that is answered."""
+        del found
+        return 0
+
+    def _is_current(self, found: Found) -> bool:
+        """Whether it answers what was asked for last."""
+        return found.kind in ("whole", "none")
+
+    def current(self, done: str) -> Found:
+        """Return what is shown, where all of it is planned; else PlanError: nothing is `done`."""
+        found = self._found
+        if found is None or not self._is_current(found):
+            raise PlanError(
+                f"what is shown is being planned; wait for its verdict, then it is {done}"
+            )
+        return found
+
+    def export(self, suffix: str) -> bytes:
+        """Return the motion as a file for a controller, or as a plan's or program's own file.
+
+        Raises
+        ------
+        ProblemError
+            The suffix is of no format.
+        PlanError
+            What is shown is not verified, or is being planned.
+        """
+        if suffix not in self.exports:
+            raise ProblemError(f"{suffix}: is no format, expected one of {', '.join(self.exports)}")
+        found = self.current("exported")
+        if not found.verified or found.plan is None:
+            raise PlanError(f"{found.words}; nothing is exported until it is verified")
+        made = found.plan if found.made is None else found.made
+        with TemporaryDirectory(prefix="selfmotion-") as folder:
+            file = Path(folder) / f"{self.file.stem}{suffix}"
+            if suffix in _OWN:
+                made.save(file)
+            else:
+                write_motion(made, file)
+            return file.read_bytes()
