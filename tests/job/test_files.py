@@ -204,7 +204,9 @@ def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch)
     np.testing.assert_array_equal(again.trajectory.q, before.trajectory.q)
     # Nothing else is tried than what is known.
     monkeypatch.setattr(work, "branches", lambda *_: ([], "nothing else is tried"))
-    monkeypatch.setattr(FreeMotions, "through", lambda self, *_: free_motion._missing(self, "nothing else"))
+    monkeypatch.setattr(
+        FreeMotions, "through", lambda self, *_: free_motion._missing(self, "nothing else")
+    )
     with pytest.raises(sm.errors.PlanError, match="nothing else is tried"):
         planned(clear_of(high), warm_start=before)
     # Nor is a move kept that goes through it.
