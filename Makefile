@@ -20,8 +20,9 @@ TWO := --numprocesses 2 -m 'not site'
 test: $(READY)  ## all tests but those of `test-site`, on two cores
 	$(BIN)/pytest $(TWO) --dist loadfile --no-loadscope-reorder --keep-durations
 
-test-site: $(READY)  ## the site, built with every example and looked at; and every arm's replay
-	$(BIN)/pytest -m site tests/docs/test_site.py tests/replay/test_browser.py tests/view/test_browser.py
+test-site: $(READY)  ## the site with every example, every arm's replay, and pages of all widths
+	$(BIN)/pytest -m site tests/docs/test_site.py tests/replay/test_browser.py tests/replay/test_layout.py \
+		tests/view/test_browser.py
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync lint quick

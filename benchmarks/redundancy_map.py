@@ -23,7 +23,7 @@ from rich.table import Table
 from suite import DATA, PathProblem, load, plan
 
 import selfmotion as sm
-from selfmotion.basics import Array, Flags, silent
+from selfmotion.basics import Array, Flags, Ints, silent
 from selfmotion.result import Reason, RedundancyMap
 from selfmotion.shell.cli.tables import console
 
@@ -105,7 +105,7 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
     found.redundancy_map()
     seconds = time.perf_counter() - began
     shown = found.redundancy_map(shape=(columns, rows))
-    wrong = differences(found, shown, problem, starts)
+    wrong = differences(shown.state, by_brute_force(found, shown, problem, starts))
     nearest = np.abs(shown.coordinate - shown.plan_line[:, None]).argmin(axis=1)
     on_line = wrong[np.arange(columns), nearest]
     return Compared(
@@ -119,8 +119,8 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
     )
 
 
-def differences(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Flags:
-    """Return which pixels differ, (N, M)."""
+def by_brute_force(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Ints:
+    """Return what stops the arm at each pixel, as brute force has it, (N, M)."""
     model, required = found.problem.envelope.bodies[0]
     own = found.trajectory(shown.times)
     oracle = Oracle(found.problem, shown, own, (), (), required, starts)
@@ -136,9 +136,13 @@ def differences(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, star
         near = Bodies(problem.robot, problem.obstacles, model.pairs).distances(q[inside], 1e-3)
         by_mujoco = near.min(axis=1, initial=1.0) < required
         print(f"{problem.name}: coal and MuJoCo differ at {(by_mujoco != meets[inside]).sum()}")
-    said = np.where(np.isin(shown.state, NOT_JUDGED), int(Reason.ALLOWED), shown.state)
+    return np.where(meets, int(Reason.ITSELF), state)
+
+
+def differences(said: Ints, brute: Ints) -> Flags:
+    """Return which pixels of a map differ from brute force, (N, M)."""
+    said = np.where(np.isin(said, NOT_JUDGED), int(Reason.ALLOWED), said)
     said = np.where(np.isin(said, OF_BODIES), int(Reason.ITSELF), said)
-    brute = np.where(meets, int(Reason.ITSELF), state)
     return np.asarray(said != brute)
 
 

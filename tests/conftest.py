@@ -1,15 +1,20 @@
 """Arms, tasks and paths that the laws are checked on."""
 
+import functools
 import gc
 from collections.abc import Callable, Generator
 
 import pytest
+import typer.main
 
 import selfmotion as sm
 from selfmotion.basics import Array
 from support.arms import CASES, PANDA_HOME, robot_named, short_line, start_of
 
 pytest_plugins = ("support.durations",)
+
+# The tree of commands is built once, and not for each of a thousand times that one of them is run.
+typer.main.get_command = functools.cache(typer.main.get_command)
 
 
 @pytest.hookimpl(wrapper=True)

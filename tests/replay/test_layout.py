@@ -13,6 +13,8 @@ from selfmotion.work.batch.folder import Folder, Row
 from support.layouts import WIDTHS, chromium, faults
 from support.replay_plans import planar_plan, two_seams
 
+pytestmark = pytest.mark.site
+
 # What tells, and what is worked with.
 TEXTS = (
     "h1",

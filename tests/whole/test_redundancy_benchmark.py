@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from redundancy_map import Compared, differences
+from redundancy_map import Compared, by_brute_force, differences
 from suite import load, plan
 
 from selfmotion.basics import silent
@@ -17,9 +17,9 @@ def test_a_map_is_accepted_and_a_shifted_one_refused() -> None:
     problem = load(DATA / "panda__1cube")
     found, _ = plan(problem, 0, silent)
     shown = found.redundancy_map(shape=(2, 31))
-    assert not differences(found, shown, problem, STARTS).any()
-    shifted = replace(shown, state=np.roll(shown.state, 1, axis=1))
-    wrong = differences(found, shifted, problem, STARTS)
+    brute = by_brute_force(found, shown, problem, STARTS)
+    assert not differences(shown.state, brute).any()
+    wrong = differences(np.roll(shown.state, 1, axis=1), brute)
     assert wrong.any()
     verdict = Compared("panda", shown.label, 1, 0.0, wrong.size, 0, 0)
     assert verdict.is_right

@@ -4,6 +4,7 @@ import dataclasses
 import importlib.metadata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,7 @@ def read_named(arm: NamedArm) -> Urdf:
     return dataclasses.replace(urdf, package_dirs=(str(share.parent), str(share)))
 
 
+@cache
 def _example_robot_data() -> Path:
     """Return the data folder of example-robot-data, which installs no importable module."""
     for file in importlib.metadata.files("example-robot-data") or []:

@@ -12,6 +12,7 @@ from selfmotion.model.task.poses import (
     as_pose as as_pose,
     exp3 as exp3,
     log3 as log3,
+    rotation_vectors as rotation_vectors,
     rpy as rpy,
     skew as skew,
     skews as skews,

@@ -72,6 +72,22 @@ def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError
 
 # Angle below which closed forms lose digits, and series are used.
 SMALL_TURN = 5e-2
+# Cosine below which a turn is so near half a turn that its sine has lost digits.
+_NEAR_HALF_TURN = -0.99
+
+
+def rotation_vectors(rotations: Array) -> Array:
+    """Return φ = log R of rotations (S, 3, 3), (S, 3) [rad]: θ / sin θ by half of R - Rᵀ."""
+    normals = np.empty((len(rotations), 3))
+    for column, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
+        normals[:, column] = 0.5 * (rotations[:, i, j] - rotations[:, j, i])
+    cosines = 0.5 * (np.einsum("sii->s", rotations) - 1.0)
+    sines = _angles(normals)
+    angles = np.arctan2(sines, cosines)
+    vectors: Array = normals * (angles / np.where(sines > 0.0, sines, 1.0))[:, None]
+    for k in np.flatnonzero(cosines < _NEAR_HALF_TURN):
+        vectors[k] = log3(rotations[k])
+    return vectors
 
 
 def turning(vectors: Array, rates: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from selfmotion.model.collision import (
 )
 from selfmotion.model.path import Circle, Line, Path
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
-from selfmotion.model.task import SE3, Quaternion, Task
+from selfmotion.model.task import SE3, Quaternion, Task, rotation_vectors
 from selfmotion.problem.constraints import PositionDependentVelocityLimits
 
 # Initial configurations of examples: those with room for the example's paths.
@@ -53,14 +53,12 @@ def roomy_starts(arm: RobotModel, task: Task, paths: Sequence[Path], count: int)
     lower, upper = arm.finite_limits()
     share = np.random.default_rng(0).uniform(0.25, 0.75, (_RANDOM_CONFIGURATIONS, arm.dof))
     drawn = lower + (upper - lower) * share
-    least = np.array([_smallest(arm, task, q) for q in drawn])
-    ways = [_positions(path) for path in paths]
-    found = []
-    for k in np.argsort(-least)[:_MOVED_CONFIGURATIONS]:
-        room = min(_room(arm, task, drawn[k], way) for way in ways)
-        if room > 0.0:
-            found.append((room, int(k)))
-    return [drawn[k] for _, k in sorted(found, reverse=True)[:count]]
+    jacobian, rotations, _ = arm.chain.along(drawn)
+    first = np.argsort(-_smallest(task.select_along(jacobian, rotations)))[:_MOVED_CONFIGURATIONS]
+    moved = drawn[first]
+    room = np.min([_room(arm, task, moved, _positions(path)) for path in paths], axis=0)
+    best = np.argsort(-room, kind="stable")[:count]
+    return [moved[k] for k in best if room[k] > 0.0]
 
 
 def _positions(path: Path) -> Array:
@@ -68,29 +66,37 @@ def _positions(path: Path) -> Array:
     return np.asarray(samples.translation - samples.translation[0])
 
 
-def _smallest(arm: RobotModel, task: Task, q: Array) -> float:
-    return float(np.linalg.svd(arm.task_jacobian(q, task), compute_uv=False)[-1])
+def _smallest(rows: Array) -> Array:
+    """Return the smallest singular values of rows (K, m, n), (K,)."""
+    return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1])
 
 
-def _room(arm: RobotModel, task: Task, q: Array, way: Array) -> float:
-    """Return the smallest singular value along a way (K, 3), 0 where the arm leaves it."""
-    begin, least = arm.pose(q), np.inf
-    for offset in way:
-        goal = SE3(begin.rotation, begin.translation + offset)
+def _room(arm: RobotModel, task: Task, q: Array, positions: Array) -> Array:
+    """Return the smallest singular values along positions (P, 3) from q (K, n), (K,).
+
+    They are 0 where the arm leaves them, or its limits.
+    """
+    _, wanted, begin = arm.chain.along(q)
+    first, least = q, np.full(len(q), np.inf)
+    for offset in positions:
         for step in range(_NEWTON_STEPS + 1):
-            jacobian, rotation, position = arm.chain.at(q)
-            error = task.twist_error(goal, SE3(rotation, position))
-            rows = task.select(jacobian, rotation)
-            left = task.select(error[:, None], rotation)[:, 0]
-            if step == _NEWTON_STEPS:
-                if np.abs(left).max() > _RESIDUAL:
-                    return 0.0
-                break
-            q = q + np.linalg.pinv(rows) @ left
-        if np.any(q < arm.lower) or np.any(q > arm.upper):
-            return 0.0
-        least = min(least, float(np.linalg.svd(rows, compute_uv=False)[-1]))
-    return float(least)
+            jacobian, rotations, translations = arm.chain.along(q)
+            # Of length sin θ: near enough, as orientations stay.
+            turned = (
+                np.cross(rotations[:, :, 2], wanted[:, :, 2])
+                if task.tool_axes
+                else rotation_vectors(wanted @ rotations.transpose(0, 2, 1))
+            )
+            error = np.hstack([begin + offset - translations, turned])[:, :, None]
+            rows = task.select_along(jacobian, rotations)
+            left = task.select_along(error, rotations)
+            if step < _NEWTON_STEPS:
+                q = q + (np.linalg.pinv(rows) @ left)[:, :, 0]
+        outside = ((q < arm.lower) | (q > arm.upper)).any(axis=1)
+        ended = outside | (np.abs(left).max(axis=(1, 2)) > _RESIDUAL) | (least == 0.0)
+        least = np.where(ended, 0.0, np.minimum(least, _smallest(rows)))
+        q = np.where(ended[:, None], first, q)
+    return least
 
 
 # The problem files that ``selfmotion init`` writes.

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
 from selfmotion.model.path import Joined, Path, Placed
 from selfmotion.model.robot import Chain, RobotModel
-from selfmotion.model.task import SE3, Quaternion, log3, skews
+from selfmotion.model.task import SE3, Quaternion, log3, rotation_vectors, skews
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_settings import (
     AXES,
@@ -192,16 +192,15 @@ class ToolFrames:
         wanted = positions @ rotation.T + self.work.translation
         facing = rotation @ Rotation.from_quat(quaternions).as_matrix()
         q = np.array(near)
-        for _ in range(_STEPS):
+        for step_number in range(_STEPS + 1):
             jacobian, rotations, translations = self._tool_along(q)
-            off = np.hstack([wanted - translations, _turned(rotations, facing)])
-            if np.abs(off).max() < _THERE:
+            turned = rotation_vectors(facing @ rotations.transpose(0, 2, 1))
+            off = np.hstack([wanted - translations, turned])
+            if step_number == _STEPS or np.abs(off).max() < _THERE:
                 break
             step = self._rates(jacobian, off)
             size = np.maximum(np.abs(step).max(axis=1) / _FARTHEST, 1.0)
             q[:, self.arm] += step / size[:, None]
-        _, rotations, translations = self._tool_along(q)
-        off = np.hstack([wanted - translations, _turned(rotations, facing)])
         return q, np.asarray(np.abs(off).max(axis=1) < _NEAR)
 
     def joint_rates(self, q: Array, rates: Array) -> Array:
@@ -354,11 +353,3 @@ def _check_beside(robot: RobotModel, link: str) -> None:
             f"{robot.name}: work_object '{link}' moves with joint '{joint}', which carries the "
             f"tool as well; expected a link that stands still, or that another axis carries"
         )
-
-
-def _turned(rotations: Array, wanted: Array) -> Array:
-    """Return the rotation vectors from orientations to wanted ones, (K, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    vectors: Array = Rotation.from_matrix(wanted @ rotations.transpose(0, 2, 1)).as_rotvec()
-    return vectors
