@@ -132,6 +132,7 @@ def page_content(
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
         "radius": box.radius,
+        "ground": float(box.low[2]),
         "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),

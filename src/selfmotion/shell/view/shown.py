@@ -61,6 +61,8 @@ class Shown:
             if found.kind != "coarse" and not found.verified:
                 content["stopped"] = list(stopping(found, payload, self._radius))
             content |= self._arm(plan, payload)
+            if found.floor is not None:
+                content["floor"] = found.floor.json(payload)
             content["handles"] = handles_json(found.request.document, plan)
         return payload.data(content)
 

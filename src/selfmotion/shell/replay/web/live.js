@@ -4,6 +4,8 @@ const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to a joint 
 // How the server ends a connection: without the token, and where another tab has the page.
 const REFUSED = 4403;
 const TAKEN = 4409;
+// The node of the places in reach.
+const FLOOR = "/selfmotion/floor";
 // A slider has so many steps.
 const STEPS = 400;
 
@@ -109,6 +111,7 @@ class Live {
       this.drawHandles(handles);
       if (coarse) this.handles?.carry();
     }
+    this.drawFloor(this.handles?.gripped ? message.floor : undefined);
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
     if (brief) get("maps").classList.add("stale");
@@ -128,6 +131,27 @@ class Live {
     // A program in the order before is verified, and not the last word.
     document.documentElement.dataset.live = open ? "coarse" : !verified ? "stopped"
       : message.kind === "early" ? "early" : "verified";
+  }
+
+  // Where else what is dragged could stand: green on the ground.
+  drawFloor(floor) {
+    const { stage, content } = this.page;
+    stage?.viewer.remove(FLOOR);
+    get("green").hidden = !floor;
+    if (!stage || !floor) return;
+    const { places, size } = floor, high = content.ground + 0.002 * content.radius;
+    const vertices = [], triangles = [];
+    for (let k = 0; k < places.length; k += 2) {
+      for (const [x, y] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+        vertices.push(places[k] + 0.46 * x * size, places[k + 1] + 0.46 * y * size, high);
+      }
+      triangles.push(...[0, 1, 2, 0, 2, 3].map((corner) => 2 * k + corner));
+    }
+    const squares = new THREE.Mesh(
+      surface({ vertices: new Float32Array(vertices), triangles: new Uint32Array(triangles) }),
+      new THREE.MeshBasicMaterial({ color: 0x2ea043, transparent: true, opacity: 0.35, depthWrite: false }));
+    stage.find(FLOOR).add(squares);
+    stage.viewer.draw();
   }
 
   drawNumbers(table) {
