@@ -170,15 +170,16 @@ def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
     sitting = open_page(file)
     with contextlib.closing(sitting):
         shown = Heard(sitting)
-        other = replace(plan, trajectory=plan.initial_trajectory)
-        replace(other, certificate=other.check()).save(tmp_path / "other.npz")
+        other = sm.plan(replace(plan.problem, costs=(sm.costs.InverseManipulability(1.0),)))
+        other.save(tmp_path / "other.npz")
         sitting.show_beside("other.npz", (tmp_path / "other.npz").read_bytes())
         found = shown.messages[-1]
         assert found["beside"] == "other.npz"
         costs = next(row["cells"] for row in found["table"] if row["label"] == "cost")
         own, beside = (float(value) for value, _ in costs)
         assert own == pytest.approx(plan.report.cost, rel=1e-5)
-        assert beside == pytest.approx(plan.report.initial_cost, rel=1e-4)
+        assert beside == pytest.approx(other.evaluate(*plan.problem.costs), rel=1e-5)
+        assert beside > own
         with pytest.raises(FileFormatError, match=r"^broken\.npz"):
             sitting.show_beside("broken.npz", b"no plan")
         sitting.show_beside("", b"")
