@@ -10,7 +10,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.work.batch.folder import Folder, is_made_for
+from selfmotion.work.batch.folder import Folder, answers
 from selfmotion.work.batch.items import Row, problem_items
 from support.arms import robot_named
 
@@ -31,12 +31,12 @@ def plan() -> sm.Plan:
     return sm.plan(problem).require()
 
 
-def test_a_plan_is_made_for_its_own_job_only(plan: sm.Plan) -> None:
+def test_a_plan_answers_its_own_job_only(plan: sm.Plan) -> None:
     problem = plan.problem
     faster = sm.retime(plan).require()
-    assert is_made_for(plan, sm.files.PlanRequest(problem))
-    assert is_made_for(faster, sm.files.PlanRequest(problem, goal="retimed"))
-    assert not is_made_for(faster, sm.files.PlanRequest(problem))
+    assert answers(plan, sm.files.PlanRequest(problem))
+    assert answers(faster, sm.files.PlanRequest(problem, goal="retimed"))
+    assert not answers(faster, sm.files.PlanRequest(problem))
     slower = [*problem.constraints, sm.constraints.JointVelocityLimits(1.0)]
     others = [
         sm.files.PlanRequest(problem, tolerance=sm.Tolerance(1e-9, 1e-9)),
@@ -45,8 +45,8 @@ def test_a_plan_is_made_for_its_own_job_only(plan: sm.Plan) -> None:
         sm.files.PlanRequest(replace(problem, relaxations=[])),
     ]
     for job in others:
-        assert not is_made_for(plan, job)
-        assert not is_made_for(faster, replace(job, goal="retimed"))
+        assert not answers(plan, job)
+        assert not answers(faster, replace(job, goal="retimed"))
 
 
 def test_a_row_that_names_another_plan_is_run_again(plan: sm.Plan, tmp_path: Path) -> None:

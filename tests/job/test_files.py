@@ -12,7 +12,7 @@ from selfmotion.basics import silent
 from selfmotion.model.task import SE3
 from selfmotion.planning.transfer import FreeMotions, free_motion
 from selfmotion.work.job import work
-from selfmotion.work.job.files import Earlier, Shelf
+from selfmotion.work.job.files import EarlierProgram, ResultCache
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -155,7 +155,7 @@ def test_what_is_kept_is_given_up_only_where_no_program_comes_of_it(program, mon
         return between(self, first, last, seconds, known)
 
     monkeypatch.setattr(FreeMotions, "between", to_no_kept_start)
-    monkeypatch.setattr(work, "leads", lambda *_: False)
+    monkeypatch.setattr(work, "satisfies", lambda *_: False)
     again = planned_again(program, seams()).require()
     turned = {step.name: step.turned for step in program.steps}
     for step in again.steps:
@@ -209,8 +209,10 @@ def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch)
         planned(clear_of(high), warm_start=before)
     # Nor is a move kept that goes through it.
     apart = clear_of(high)
-    asked = work.Asked(panda, (), apart, 1, 1.0, 0)
-    at_work = work.Work(asked, Shelf(None, sm.Tolerance(), {}), None, silent, Earlier(before))
+    asked = work.JobSettings(panda, (), apart, 1, 1.0, 0)
+    at_work = work.Work(
+        asked, ResultCache(None, sm.Tolerance(), {}), None, silent, EarlierProgram(before)
+    )
     move = next(step.made for step in before.steps if not step.is_seam)
     (found,) = at_work.moves([(*move.motion.q[[0, -1]], ())], ["move"])
     assert not found.verified

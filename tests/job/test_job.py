@@ -313,7 +313,7 @@ def test_a_seam_that_no_move_reaches_is_given_up_soon(monkeypatch) -> None:
     lone = seam("lone", [0.4, 0.3, 0.4], [0.45, 0.3, 0.4])
     first = replace(lone, name="first", leaves=[post])
     then = seam("then", [0.5, 0.0, 0.35], [0.55, 0.0, 0.35], after=["first"])
-    tried, move = itertools.count(1), work._move_here
+    tried, move = itertools.count(1), work._compute_move
 
     def blocked(task) -> sm.Move:
         missing = sm.Move(*task["arm"], None, "not found")
@@ -322,7 +322,7 @@ def test_a_seam_that_no_move_reaches_is_given_up_soon(monkeypatch) -> None:
         next(tried)
         return missing
 
-    monkeypatch.setattr(work, "_move_here", blocked)
+    monkeypatch.setattr(work, "_compute_move", blocked)
     made = sm.plan_job(robot_named("panda"), [first, then, lone], branches=1)
     assert made.order == ("lone", "first")
     assert made.missing["then"] == "the move to it: not found"

@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3
 from selfmotion.work.job import Step
-from selfmotion.work.job.files import Shelf
+from selfmotion.work.job.files import ResultCache
 from selfmotion.work.job.seam import backwards, backwards_plan
 from support.arms import robot_named
 
@@ -149,22 +149,22 @@ def test_another_plan_of_the_same_problem_is_not_what_was_kept(kept, tmp_path: P
     """Two that begin elsewhere are both sound: only what was written with them tells them apart."""
     _, program = kept
     plan = program.plans["one"]
-    shelf = Shelf(tmp_path, sm.Tolerance(), {})
+    cache = ResultCache(tmp_path, sm.Tolerance(), {})
     files = [tmp_path / f"nearby-one.{key}.json" for key in ("a", "b")]
     for number, file in enumerate(files):
         other = replace(plan, coefficients=np.full(1, float(number)))
-        shelf.keep_plans(file, ([other], ""))
-    assert shelf.plans(files[0], plan.problem) is not None
+        cache.store_plans(file, ([other], ""))
+    assert cache.plans(files[0], plan.problem) is not None
     swapped(tmp_path, "nearby")
-    assert [shelf.plans(file, plan.problem) for file in files] == [None, None]
+    assert [cache.plans(file, plan.problem) for file in files] == [None, None]
     # Nor where all of one is put in the place of the other, by its name.
     swapped(tmp_path, "nearby")
     (archive, _), said = sorted(tmp_path.glob("*.npz")), files[1].read_text()
     shutil.copy(archive, archive.with_name(archive.name.replace(".a.", ".b.")))
-    assert shelf.plans(files[0], plan.problem) is not None
+    assert cache.plans(files[0], plan.problem) is not None
     files[1].write_text(files[0].read_text().replace("nearby-one.a", "nearby-one.b"))
     assert files[1].read_text() != said
-    assert shelf.plans(files[1], plan.problem) is None
+    assert cache.plans(files[1], plan.problem) is None
 
 
 def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:
@@ -222,10 +222,10 @@ def test_all_bodies_are_kept_as_far_as_was_asked_by_one_clearance() -> None:
     def step(*judged: sm.constraints.Clearance) -> Step:
         return Step("one", sm.Move(robot_named("panda"), judged, None, "none"))
 
-    assert step(sm.constraints.Clearance([], 0.02), sm.constraints.Clearance([post], 0.0)).meets(
-        {"post": post}, asked
-    )
-    assert not step(sm.constraints.Clearance([post], 0.03)).meets({"post": post}, asked)
+    assert step(
+        sm.constraints.Clearance([], 0.02), sm.constraints.Clearance([post], 0.0)
+    ).unchecked({"post": post}, asked)
+    assert not step(sm.constraints.Clearance([post], 0.03)).unchecked({"post": post}, asked)
 
 
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])

@@ -21,21 +21,21 @@ from selfmotion.problem.problem import Problem
 from selfmotion.work.batch.items import LATE, Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
 
-# Whether a plan is what a job of a batch asks for.
+# Whether a plan answers a request.
 
 
-def is_made_for(plan: Plan, job: PlanRequest) -> bool:
-    """Whether a plan is of a job's problem, judged by all that it asks within its tolerance.
+def answers(plan: Plan, job: PlanRequest) -> bool:
+    """Whether a plan is of the problem of a request, judged with its tolerance.
 
-    Of a fastest motion: along the same path, at whatever pace.
+    A fastest motion may have any pace along the same path.
     """
-    asked, made = job.problem, plan.problem
+    asked, own = job.problem, plan.problem
     tolerance = job.tolerance or USUAL
     if job.goal == "best":
-        return made.digest == asked.digest and plan.tolerance == tolerance
+        return own.digest == asked.digest and plan.tolerance == tolerance
     wanted = _at_its_own_pace(asked, asked)
-    # The certificate belongs to another problem then; its requirements are reported all the same.
-    alike = replace(plan, problem=_at_its_own_pace(made, asked))
+    # The certificate is of another problem then, but has the same requirements.
+    same_path = replace(plan, problem=_at_its_own_pace(own, asked))
     held = MotionSpecification(
         wanted.robot,
         wanted.path,
@@ -47,12 +47,12 @@ def is_made_for(plan: Plan, job: PlanRequest) -> bool:
         rest=wanted.rest and wanted.damping is None,
     )
     rows = [(item.rows, item.band, item.axes) for item in asked.relaxations]
-    same = rows == [(item.rows, item.band, item.axes) for item in made.relaxations]
-    return same and not list(held.failures(alike))
+    same = rows == [(item.rows, item.band, item.axes) for item in own.relaxations]
+    return same and not list(held.failures(same_path))
 
 
 def _at_its_own_pace(problem: Problem, asked: Problem) -> Problem:
-    """Return a problem along what its paths are made of, with the windows that were asked for."""
+    """Return a problem along its paths before retiming, with the windows of the request."""
     return replace(problem, **problem.along(_original), relaxations=tuple(asked.relaxations))
 
 
@@ -62,7 +62,7 @@ def _original(path: ToolPath) -> ToolPath:
     return path
 
 
-# A batch on disk: per problem a plan and a row; ranked tables of all of them.
+# The folder of a batch: a plan and a row for each problem, and ranked tables.
 
 
 class Folder:
@@ -85,8 +85,8 @@ class Folder:
     def finished(self, item: Item) -> Row | None:
         """Return the row of a problem that an earlier run finished; None if it has to be run.
 
-        Its plan is measured again: a row is not believed. Where the file is not the one that was
-        written with the row, or not of what is asked, it is planned again.
+        Its plan is certified again. Where the file is not the one that was written with the row, or
+        is of another problem, the problem is planned again.
         """
         name = item.name
         values = read_kept(self._row_file(name))
@@ -101,12 +101,12 @@ class Folder:
             if digest_of_file(row.file) != row.digest:
                 return None
             plan, job = load_plan(row.file, known=self._known), item.make()
-            if plan.altered or not is_made_for(plan, job):
+            if plan.altered or not answers(plan, job):
                 return None
             row = replace(row, settings=dict(item.settings), goal=job.goal)
             return replace(row, **measured(plan, job.goal))
         except (OSError, ValueError, TypeError, SelfmotionError):
-            return None  # not one of ours, or of another version: it is written anew
+            return None  # not written by a batch, or by another version: planned again
 
     def record(self, row: Row, archive: bytes) -> Row:
         """Write plan and row, in this order: a row says that all is there."""
@@ -123,11 +123,11 @@ class Folder:
         planned = [row for row in ranked if not row.error]
         links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
         keys = list(dict.fromkeys(key for row in rows for key in row.settings))
-        said = ["verified", "reason", "cost", "minimum-norm motion", "margin", "clearance"]
-        said += ["duration", "seconds", "plan", "replay", "verdict"]
+        columns = ["verified", "reason", "cost", "minimum-norm motion", "margin", "clearance"]
+        columns += ["duration", "seconds", "plan", "replay", "verdict"]
         lines = [self._cells(k, row, keys, links) for k, row in enumerate(ranked, 1)]
-        write_text(self.path / "table.csv", _csv([["rank", "name", *keys, *said], *lines]))
-        page = _page(["rank", "name", *labels(keys), *said], lines, maps(rows, links))
+        write_text(self.path / "table.csv", _csv([["rank", "name", *keys, *columns], *lines]))
+        page = _page(["rank", "name", *labels(keys), *columns], lines, maps(rows, links))
         write_text(self.path / "index.html", page)
 
     def _cells(
@@ -143,14 +143,14 @@ class Folder:
         file = "" if row.error else row.file.relative_to(self.path).as_posix()
         state = "no plan" if row.error else "yes" if row.verified else "no"
         timing = f"{row.seconds:.3f}"
-        said = row.error or row.verdict
+        verdict = row.error or row.verdict
         start = [str(rank), row.name, *settings, state, row.reason, *numbers, timing]
-        return [*start, file, links.get(row.name, ""), said]
+        return [*start, file, links.get(row.name, ""), verdict]
 
     def _replay(self, row: Row, wanted: bool) -> str:
         """Return the address of a plan's replay, made once and only where wanted."""
         file = self.path / "replays" / f"{row.name}.html"
-        # A plan that was made anew is newer than its replay.
+        # A plan that was planned again is newer than its replay.
         sound = file.is_file() and file.stat().st_mtime >= row.file.stat().st_mtime
         if not sound and wanted and Plan.views is not None:
             Plan.views.write_replay(row.plan(), file)
@@ -216,10 +216,10 @@ def _page(header: Sequence[str], lines: Sequence[Sequence[str]], pictures: Seque
     def cell(k: int, text: str) -> str:
         safe = html.escape(text)
         address = urllib.parse.quote(text)
-        said = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
+        content = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
         name = html.escape(_HEADS.get(header[k], header[k]))
         whole = ' class="whole"' if header[k] in _WHOLE else ""
-        return f'<td{whole} data-name="{name}">{said}</td>'
+        return f'<td{whole} data-name="{name}">{content}</td>'
 
     rows = ("".join(cell(k, line[k]) for k in shown) for line in lines)
     return _PAGE.format(

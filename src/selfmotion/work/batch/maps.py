@@ -39,12 +39,12 @@ def labels(keys: Sequence[str]) -> list[str]:
     """Return short names of the keys of a grid: their last words, if these differ."""
     words = []
     for key in keys:
-        *way, last = key.split(".")
-        names = _OF_POSES.get(way[-1]) if way else None
+        *parents, last = key.split(".")
+        names = _OF_POSES.get(parents[-1]) if parents else None
         if names and last in ("0", "1", "2"):
             words.append(names[int(last)])
         else:
-            words.append(f"{way[-1]}.{last}" if way and last.isdigit() else last)
+            words.append(f"{parents[-1]}.{last}" if parents and last.isdigit() else last)
     return words if len(set(words)) == len(words) else list(keys)
 
 
@@ -154,18 +154,18 @@ def _picture(
     """Return one map: the first number to the right, the second one up."""
     width, height = _LEFT + _WIDE * len(across) + _RIGHT, _TOP + _HIGH * len(up) + _BOTTOM
     floor = _TOP + _HIGH * len(up)
-    parts = [_said(_LEFT, _TOP - 10, title, "start", "bold")] if title else []
+    parts = [_text_at(_LEFT, _TOP - 10, title, "start", "bold")] if title else []
     for k, value in enumerate(across):
-        parts.append(_said(_LEFT + _WIDE * (k + 0.5), floor + 15, f"{value:.4g}"))
+        parts.append(_text_at(_LEFT + _WIDE * (k + 0.5), floor + 15, f"{value:.4g}"))
     for k, value in enumerate(up):
-        parts.append(_said(_LEFT - 6, floor - _HIGH * (k + 0.5) + 4, f"{value:.4g}", "end"))
-    parts.append(_said(_LEFT + 0.5 * _WIDE * len(across), floor + 31, heads[0]))
+        parts.append(_text_at(_LEFT - 6, floor - _HIGH * (k + 0.5) + 4, f"{value:.4g}", "end"))
+    parts.append(_text_at(_LEFT + 0.5 * _WIDE * len(across), floor + 31, heads[0]))
     middle = _TOP + 0.5 * _HIGH * len(up)
-    parts.append(f'<g transform="rotate(-90 12 {middle:g})">{_said(12, middle, heads[1])}</g>')
+    parts.append(f'<g transform="rotate(-90 12 {middle:g})">{_text_at(12, middle, heads[1])}</g>')
     for x, y, row in cells:
         left = _LEFT + _WIDE * across.index(x)
         parts.append(_cell(left, floor - _HIGH * (up.index(y) + 1), row, scale, links))
-    parts.append(_said(_LEFT, floor + 52, _legend(scale), "start"))
+    parts.append(_text_at(_LEFT, floor + 52, _legend(scale), "start"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" '
         f'style="background:#fff" font-family="system-ui,sans-serif" font-size="12">'
@@ -189,7 +189,7 @@ def _cell(left: float, top: float, row: Row, scale: _Scale, links: Mapping[str, 
     inner += f'fill="{fill}" {edge}/>'
     for k, line in enumerate(lines):
         height = top + 0.5 * _HIGH + 4 + 14 * (k - 0.5 * (len(lines) - 1))
-        inner += _said(left + 0.5 * _WIDE, height, line, colour=ink)
+        inner += _text_at(left + 0.5 * _WIDE, height, line, colour=ink)
     inner += f"<title>{html.escape(f'{row.name}: {row.error or row.verdict}')}</title>"
     address = links.get(row.name, "")
     linked = f'<a href="{urllib.parse.quote(address)}">{inner}</a>' if address else inner
@@ -204,7 +204,7 @@ def _lines(reason: str) -> list[str]:
     return [line[:_LINE] for line in (first, " ".join(rest)) if line]
 
 
-def _said(
+def _text_at(
     x: float, y: float, text: str, anchor: str = "middle", weight: str = "", colour: str = "#222"
 ) -> str:
     bold = f' font-weight="{weight}"' if weight else ""

@@ -1,4 +1,4 @@
-"""Programs as files: what a job has finished so far, and what an earlier one knows."""
+"""Files of a job: saved programs, results so far, and what an earlier program provides."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ from selfmotion.problem.costs import Cost, FunctionCost
 from selfmotion.problem.problem import Problem
 from selfmotion.work.job.program import Program
 from selfmotion.work.job.program_files import FORMAT
-from selfmotion.work.job.seam import Seam, Step, waiting
+from selfmotion.work.job.seam import Seam, Step, precedences
 from selfmotion.work.job.specification import Specification
 
-# Programs as files, and what a job has finished so far.
+# Saved programs, and the results of a job so far.
 
 # Rounding of the end of a move [rad or m].
 _JOINED = 1e-9
@@ -75,8 +75,9 @@ def load_program(file: str | Path) -> Program:
         missing = {str(name): str(why) for name, why in description["missing"].items()}
         notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
         unjudged = tuple(map(str, description.get("unjudged", ())))
-        asked = description["specification"]
-        specification = None if asked is None else Specification.from_dict(asked, made[0].robot)
+        values = description["specification"]
+        robot = made[0].robot
+        specification = None if values is None else Specification.from_dict(values, robot)
         if not math.isfinite(bound):
             raise ValueError(f"bound is {bound}, not finite")
     except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
@@ -97,20 +98,21 @@ def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
     )
 
 
-class Shelf:
-    """A folder with what a job has finished: plans and moves by what was asked for.
+class ResultCache:
+    """A folder with the plans and moves that a job has finished, by the description of each task.
 
-    What is kept is read in one way: written for this very work, whole, unchanged, measured again
-    with today's tolerance and verified; or it is planned again.
+    A stored result is used only if it was written for this very task, is complete and unchanged,
+    and is verified when it is measured again with the present tolerance. Otherwise it is planned
+    again.
 
     Parameters
     ----------
     folder : Path or None
-        None keeps nothing.
+        None stores nothing.
     tolerance : Tolerance
-        What a seam may miss its path by.
+        Largest deviation of a seam from its path.
     known : mapping
-        Arms and constraints that are made already; see `load_plan`.
+        Arms and constraints that are loaded already; see `load_plan`.
     """
 
     def __init__(
@@ -126,36 +128,36 @@ class Shelf:
     def file(
         self,
         name: str,
-        asked: Callable[[], Any],
+        describe: Callable[[], Any],
         robot: RobotModel,
         constraints: Sequence[Constraint],
     ) -> Path | None:
-        """Return the file for what was asked (JSON-safe) under a name; None without a folder.
+        """Return the file of a task by its JSON-safe description; None without a folder.
 
-        Of an arm, with what bodies are made of.
+        Its name has a digest of the description and of the files of all bodies.
         """
         if self._folder is None:
             return None
-        key = key_of((asked(), asdict(self._tolerance)), self.files(robot, constraints))[:16]
+        key = key_of((describe(), asdict(self._tolerance)), self.files(robot, constraints))[:16]
         plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
         return self._folder / f"{plain}.{key}.json"
 
     def files(self, robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, str]:
-        """Return the digests of what an arm's bodies and those it keeps apart from are made of."""
+        """Return the digests of the files of an arm's bodies and of its obstacles."""
         return files_of(robot, constraints, self._known)
 
     def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
-        """Return the plans of a problem that were kept, and why there are none.
+        """Return the stored plans of a problem, and why there are none.
 
-        None for nothing kept.
+        None where nothing is stored.
         """
-        kept = None if file is None else read_kept(file)
-        if file is None or kept is None:
+        stored = None if file is None else read_kept(file)
+        if file is None or stored is None:
             return None
         try:
-            files = _written(kept, file)
-            found, reason = [self._plan(name) for name in files], str(kept["reason"])
-            # Each begins at its own place.
+            files = _stored_archives(stored, file)
+            found, reason = [self._plan(name) for name in files], str(stored["reason"])
+            # Each has its own start.
             problems = [replace(plan.problem, start=problem.start) for plan in found]
         except (SelfmotionError, KeyError, TypeError, ValueError):
             return None
@@ -169,34 +171,34 @@ class Shelf:
             return plan
         return replace(plan, certificate=plan.check(self._tolerance))
 
-    def keep_plans(self, file: Path | None, made: tuple[Sequence[Plan], str]) -> None:
-        """Keep plans, or why there are none."""
+    def store_plans(self, file: Path | None, result: tuple[Sequence[Plan], str]) -> None:
+        """Store plans, or why there are none."""
         if file is None:
             return
-        plans, reason = made
+        plans, reason = result
         for plan, archive in zip(plans, _archives(file, len(plans)), strict=True):
             plan.save(archive)
         _write(file, len(plans), {"reason": reason})
 
     def move(self, file: Path | None, missing: Move, ends: Array) -> Move | None:
-        """Return the move between ends (2, n) that was kept, or `missing` with the reason.
+        """Return the stored move between ends (2, n), or `missing` with the reason.
 
-        None for nothing kept.
+        None where nothing is stored.
         """
-        kept = None if file is None else read_kept(file)
-        if file is None or kept is None:
+        stored = None if file is None else read_kept(file)
+        if file is None or stored is None:
             return None
         try:
-            if kept["trouble"]:
-                return replace(missing, reason=str(kept["trouble"]))
-            (archive,) = _written(kept, file)
+            if stored["trouble"]:
+                return replace(missing, reason=str(stored["trouble"]))
+            (archive,) = _stored_archives(stored, file)
             found = load_move(archive, known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
-        return found if leads(found, missing, ends) else None
+        return found if satisfies(found, missing, ends) else None
 
-    def keep_move(self, file: Path | None, move: Move) -> None:
-        """Keep a move, or why there is none."""
+    def store_move(self, file: Path | None, move: Move) -> None:
+        """Store a move, or why there is none."""
         if file is None:
             return
         count = int(move.trajectory is not None)
@@ -205,8 +207,8 @@ class Shelf:
         _write(file, count, {"trouble": "" if count else move.trouble})
 
 
-def leads(found: Move, missing: Move, ends: Array) -> bool:
-    """Whether a move is verified for what is asked of a `missing` one, between ends (2, n)."""
+def satisfies(found: Move, missing: Move, ends: Array) -> bool:
+    """Whether a move is verified for the arm, constraints and ends (2, n) of a `missing` one."""
     if found.trajectory is None or any(another_tool(found.robot, missing.robot)):
         return False
     if float(np.abs(found.motion.q[[0, -1]] - ends).max()) > _JOINED:
@@ -220,17 +222,17 @@ def _archives(file: Path, count: int) -> list[Path]:
 
 
 def _write(file: Path, count: int, values: Mapping[str, Any]) -> None:
-    """Write what is known of a piece of work, last: also the digest of each archive."""
+    """Write the record of a result, last, with the digest of each of its archives."""
     digests = [digest_of_file(archive) for archive in _archives(file, count)]
     write_kept(file, {"digests": digests, **values})
 
 
-def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:
-    """Return the archives that were written with what is known of a piece of work.
+def _stored_archives(stored: Mapping[str, Any], file: Path) -> list[Path]:
+    """Return the archives that were written with a record.
 
-    One of other work has a sound motion as well, and may be of the same problem, from elsewhere.
+    An archive of another task has a sound motion as well, and may be of the same problem.
     """
-    digests = list(kept["digests"])
+    digests = list(stored["digests"])
     archives = _archives(file, len(digests))
     for archive, digest in zip(archives, digests, strict=True):
         if digest_of_file(archive) != digest:
@@ -240,16 +242,16 @@ def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:
 
 # Motions of seams and paths of moves from an earlier program of the same or a similar job.
 
-# A move whose ends are farther away than this in all [rad or m] tells nothing.
+# A move whose ends are farther away than this in all is of no use [rad or m].
 _NEAR = 1.5
 # Samples of an earlier move, from which its corners are found.
-_LOOKS = 65
-# Deviation of the samples from straight legs between these corners [rad or m].
+_SAMPLES = 65
+# Deviation of the samples from the polyline of these corners [rad or m].
 _STRAIGHT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Earlier:
+class EarlierProgram:
     """Results of an earlier program.
 
     Parameters
@@ -271,7 +273,7 @@ class Earlier:
         plan, turned = self._of_seams.get(seam.name, (None, False))
         return None if plan is None or (turned and not seam.either_way) else (plan, turned)
 
-    def kept(
+    def unchanged_plan(
         self,
         seam: Seam,
         problem: Problem,
@@ -280,8 +282,8 @@ class Earlier:
     ) -> tuple[Plan | None, str]:
         """Return the plan of an unchanged seam, or the reason why there is none.
 
-        Judged anew by its `problem`, in the direction in which it was made: what files of bodies
-        hold may have changed. `constraints` and `clearance` are those of the job.
+        It is certified anew for its `problem`, in its direction, since files of bodies may have
+        changed. `constraints` and `clearance` are those of the job.
         """
         known = self.plan_of(seam)
         if seam.name not in self._of_seams:
@@ -305,7 +307,7 @@ class Earlier:
         constraints: Sequence[Constraint],
         clearance: Clearance | None,
     ) -> str:
-        """Return in words what is asked otherwise of a seam; "" where nothing is."""
+        """Return in words what of a seam's specification has changed; "" for nothing."""
         before = self.program.specification
         if before is None:
             return "the earlier program does not say what was asked for"
@@ -331,10 +333,11 @@ class Earlier:
                 return text
         return ""
 
-    def kept_in(self, program: Program, changed: Mapping[str, str], why: str) -> dict[str, str]:
+    def kept_seams(self, program: Program, changed: Mapping[str, str], why: str) -> dict[str, str]:
         """Return for each seam of a program "" where its motion is kept, else why it is not.
 
-        What is asked otherwise is `changed`; `why` no program came of what could be kept.
+        `changed` has seams whose specification changed; `why` says what was wrong with a program
+        of all unchanged motions.
         """
         found = dict[str, str]()
         for name, plan in program.plans.items():
@@ -350,16 +353,16 @@ class Earlier:
 
     def order_of(self, seams: Sequence[Seam]) -> list[Seam] | None:
         """Return the seams in its order, if it has the same seams and this order is allowed."""
-        named, made = {seam.name: seam for seam in seams}, self.program.order
-        if sorted(made) != sorted(named):
+        named, order = {seam.name: seam for seam in seams}, self.program.order
+        if sorted(order) != sorted(named):
             return None
-        listed = [named[name] for name in made]
-        return listed if waiting(listed).keeps(range(len(listed))) else None
+        listed = [named[name] for name in order]
+        return listed if precedences(listed).keeps(range(len(listed))) else None
 
     def move_like(self, ends: Array) -> Move | None:
         """Return the move whose ends are nearest to others (2, n), or None for none near."""
-        found = [move for move in self.program.moves if _leads_somewhere(move)]
-        far = [_apart(move.motion.q[[0, -1]], ends) for move in found]
+        found = [move for move in self.program.moves if _moves_the_arm(move)]
+        far = [_distance(move.motion.q[[0, -1]], ends) for move in found]
         k = int(np.argmin(far)) if far else -1
         return found[k] if k >= 0 and far[k] < _NEAR else None
 
@@ -391,35 +394,36 @@ def check_earlier(earlier: object, robot: RobotModel) -> None:
     check_joints(earlier.robot, robot)
 
 
-def way_along(motion: Trajectory, ends: Array) -> Array:
-    """Return the corners (m, n) of a motion whose ends are put elsewhere, (2, n).
+def adapted_waypoints(motion: Trajectory, ends: Array) -> Array:
+    """Return the corners (m, n) of a motion, moved so that it has other ends (2, n).
 
-    What one end is moved by fades out towards the other one.
+    The displacement of each end fades out towards the other one.
     """
-    q = motion(np.linspace(motion.t[0], motion.t[-1], _LOOKS))
+    q = motion(np.linspace(motion.t[0], motion.t[-1], _SAMPLES))
     gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
-    share = (gone / gone[-1])[:, None] if gone[-1] > 0.0 else np.linspace(0.0, 1.0, _LOOKS)[:, None]
-    way = q + (1.0 - share) * (ends[0] - q[0]) + share * (ends[1] - q[-1])
-    return np.asarray(way[_corners(way, 0, _LOOKS - 1)])
+    even = np.linspace(0.0, 1.0, _SAMPLES)
+    share = (gone / gone[-1] if gone[-1] > 0.0 else even)[:, None]
+    points = q + (1.0 - share) * (ends[0] - q[0]) + share * (ends[1] - q[-1])
+    return np.asarray(points[_corners(points, 0, _SAMPLES - 1)])
 
 
-def _corners(way: Array, first: int, last: int) -> list[int]:
-    """Return which points of a way straight legs have to pass (Ramer, Douglas and Peucker)."""
+def _corners(points: Array, first: int, last: int) -> list[int]:
+    """Return which of the points (m, n) a polyline needs (Ramer, Douglas and Peucker)."""
     share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
-    legs = way[first] + share * (way[last] - way[first])
-    off = np.abs(way[first : last + 1] - legs).max(axis=1)
+    chord = points[first] + share * (points[last] - points[first])
+    off = np.abs(points[first : last + 1] - chord).max(axis=1)
     k = first + int(np.argmax(off))
     if off.max() <= _STRAIGHT:
         return [first, last]
-    return [*_corners(way, first, k)[:-1], *_corners(way, k, last)]
+    return [*_corners(points, first, k)[:-1], *_corners(points, k, last)]
 
 
-def _leads_somewhere(move: Move) -> bool:
+def _moves_the_arm(move: Move) -> bool:
     """Whether it is a move that was found, not a wait."""
     motion = move.trajectory
     return motion is not None and float(np.abs(motion.q[-1] - motion.q[0]).max()) > 0.0
 
 
-def _apart(ends: Array, others: Array) -> float:
-    """Return how far two pairs of ends (2, n) are from each other in all [rad or m]."""
+def _distance(ends: Array, others: Array) -> float:
+    """Return the distance of two pairs of ends (2, n), the sum of both [rad or m]."""
     return float(np.abs(ends - others).max(axis=1).sum())

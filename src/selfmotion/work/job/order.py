@@ -1,4 +1,4 @@
-"""The shortest round of stops that can be made in several ways: in which order, and how each."""
+"""The shortest round of stops with several states each: the order, and the state of each."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,30 +11,30 @@ from selfmotion.work.job.stops import NO_ROUND, Round, Stops, along, feasible_or
 
 # Local search for many stops: 2-opt and or-opt.
 #
-# They are put one after the other by what is nearest, then stretches of the order are moved and
-# turned round where that pays (2-opt and or-opt), each try with the best states by dynamic
-# programming along what it changes: what the stops before cost and those after it, by state,
-# stays. What cannot be done costs more than any round there, so that these steps lead out of it;
-# where they do not, `feasible_order` looks for an order without costs.
+# The first order is by nearest neighbours. Then segments of it are moved and reversed where that
+# lowers the cost (2-opt and or-opt). The best states of each trial are found by dynamic programming
+# along the segment that it changes: the costs of stops before and after it, by state, stay.
+# Forbidden transitions cost more than any allowed round, so that these steps lead out of them;
+# where they do not, `feasible_order` finds an order without regard to costs.
 
-# Rounds of tries, at most.
-_ROUNDS = 12
+# Sweeps over an order, at most.
+_SWEEPS = 12
 
 
 def improved(stops: Stops, near: Sequence[int] | None = None) -> Round:
-    """Return a good round of many stops, and a bound of what any costs.
+    """Return a good round of many stops, with a lower bound of the cost of any round.
 
     Parameters
     ----------
     stops : Stops
     near : sequence of int, optional
-        An order to begin with; by default what is nearest comes next.
+        An order to begin with; by default that of nearest neighbours.
     """
     dear = _with_prices(stops)
     order = _nearest_first(dear) if near is None else list(near)
     if order is None:
         return NO_ROUND
-    order = _settled(dear, order)
+    order = _local_optimum(dear, order)
     if not along(stops, order)[0]:
         found = feasible_order(
             stops.after,
@@ -45,7 +45,7 @@ def improved(stops: Stops, near: Sequence[int] | None = None) -> Round:
             np.isfinite(stops.last),
             stops.too_late,
         )
-        order = [] if found is None else _settled(dear, found)
+        order = [] if found is None else _local_optimum(dear, found)
     states, cost = along(stops, order)
     return Round(states, cost, lower_bound(stops)) if states else NO_ROUND
 
@@ -88,27 +88,27 @@ def _by_stop(stops: Stops) -> Array:
 
 
 def _nearest_first(stops: Stops) -> list[int] | None:
-    """Return an order that goes on with what is nearest, as far as that may be made."""
+    """Return the order of nearest neighbours that precedences allow; None for a dead end."""
     order: list[int] = []
-    made, flags = set[int](), np.zeros(stops.count, dtype=bool)
-    cost = stops.first + stops.made_after(flags, np.arange(len(stops.of)))
+    visited, flags = set[int](), np.zeros(stops.count, dtype=bool)
+    cost = stops.first + stops.cost_after(flags, np.arange(len(stops.of)))
     while len(order) < stops.count:
-        may = [k for k in range(stops.count) if k not in made and stops.allows(k, made)]
+        may = [k for k in range(stops.count) if k not in visited and stops.allows(k, visited)]
         if not may:
             return None
         nearest = min(may, key=lambda k: float(cost[stops.states[k]].min()))
         states = stops.states[nearest]
         order.append(nearest)
-        made.add(nearest)
+        visited.add(nearest)
         flags[nearest] = True
         reached = cost[states]
         cost = (reached[:, None] - reached.min() + stops.between[states]).min(axis=0)
-        cost += stops.made_after(flags, np.arange(len(stops.of)))
+        cost += stops.cost_after(flags, np.arange(len(stops.of)))
     return order
 
 
-def _settled(stops: Stops, order: Sequence[int]) -> list[int]:
-    """Return an order after moving and turning round stretches of it until none pays any more."""
+def _local_optimum(stops: Stops, order: Sequence[int]) -> list[int]:
+    """Return an order in which no segment can be moved or reversed at a gain."""
     after = np.zeros((stops.count, stops.count), dtype=bool)
     for stop, those in enumerate(stops.after):
         after[stop, list(those)] = True
@@ -124,7 +124,7 @@ def _settled(stops: Stops, order: Sequence[int]) -> list[int]:
         _padded([sorted(those) for those in stops.after_any]),
     )
     found = np.array(order, dtype=np.int64)
-    for _ in range(_ROUNDS):
+    for _ in range(_SWEEPS):
         obey_interruption()
         if not swept(found, tables):
             break
@@ -140,11 +140,11 @@ def _padded(rows: Sequence[Sequence[int]]) -> Ints:
 
 # The shortest round: exact for few stops.
 #
-# Up to a dozen stops are ordered exactly, by dynamic programming over the sets of stops made (M.
-# Held, R. Karp, "A dynamic programming approach to sequencing problems", 1962), with the states
-# of the last one beside the set; more of them by `improved`.
+# Up to a dozen stops are ordered exactly, by dynamic programming over the sets of stops visited and
+# the states of the last one (M. Held, R. Karp, "A dynamic programming approach to sequencing
+# problems", 1962); more of them by `improved`.
 
-# Stops that are ordered exactly, at most: the sets of more fit neither into time nor memory.
+# Stops that are ordered exactly, at most: time and memory double with each further one.
 EXACT = 12
 
 
@@ -153,7 +153,7 @@ def best_round(
 ) -> Round:
     """Return the best round: exactly for a `given` order, or up to `EXACT` stops.
 
-    Of more stops a good one, which is looked for from an order that is `near` to it.
+    Of more stops a good one, found by local search from an order `near` to it.
     """
     if given is not None:
         states, cost = along(stops, given)
@@ -172,30 +172,31 @@ def exact(stops: Stops) -> Round:
     masks = [sum(1 << k for k in each) for each in stops.after]
     any_of = [sum(1 << k for k in each) for each in stops.after_any]
     bits = 1 << np.arange(n)
-    for made in range(full):
-        cost = best[made]
-        if made and not np.isfinite(cost).any():
+    for visited in range(full):
+        cost = best[visited]
+        if visited and not np.isfinite(cost).any():
             continue
         for stop in range(n):
             bit = 1 << stop
-            if made & bit or masks[stop] & ~made or (any_of[stop] and not any_of[stop] & made):
+            supported = not any_of[stop] or any_of[stop] & visited
+            if visited & bit or masks[stop] & ~visited or not supported:
                 continue
             states = stops.states[stop]
-            if made == 0:
-                new, came = stops.first[states], np.full(len(states), -1)
+            if visited == 0:
+                new, predecessors = stops.first[states], np.full(len(states), -1)
             else:
-                ways = cost[:, None] + stops.between[:, states]
-                came = ways.argmin(axis=0)
-                new = ways[came, np.arange(len(states))]
-            best[made | bit, states] = new + stops.made_after((bits & made) > 0, states)
-            before[made | bit, states] = came
+                totals = cost[:, None] + stops.between[:, states]
+                predecessors = totals.argmin(axis=0)
+                new = totals[predecessors, np.arange(len(states))]
+            best[visited | bit, states] = new + stops.cost_after((bits & visited) > 0, states)
+            before[visited | bit, states] = predecessors
     ends = best[full] + stops.last
     state = int(np.argmin(ends))
     cost = float(ends[state])
     if not np.isfinite(cost):
         return NO_ROUND
-    found, made = [], full
+    found, visited = [], full
     while state >= 0:
         found.append(state)
-        made, state = made & ~(1 << int(stops.of[state])), int(before[made, state])
+        visited, state = visited & ~(1 << int(stops.of[state])), int(before[visited, state])
     return Round(tuple(found[::-1]), cost, cost)

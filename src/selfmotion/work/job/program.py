@@ -41,21 +41,21 @@ class Program:
     steps : tuple of Step
         Seams, and the moves and waits between them, in order of time.
     missing : mapping
-        Seams that could not be made, and why.
+        Seams without a motion, and why.
     bound : float
-        No order of the motions that are known of the seams takes less for moves [s]: of up to
+        Lower bound of the time of moves of any order of the motions that were planned [s]: of up to
         twelve seams by the times of the moves themselves, of more by limits of speed and
         acceleration.
     notes : tuple of str
         What a reader should know: which orders were given up, and why.
     specification : Specification, optional
-        What was asked for, which the steps are held against; None for steps that were put together
-        by hand, and the verdict says so.
+        What was asked for, against which the steps are judged; None for steps that were put
+        together by hand, and the verdict says so.
     kept : mapping, optional
-        Where it was begun at an earlier program: each seam, with "" where its motion is that of the
-        earlier one, bit for bit, else with why it is not; else None. Files do not have it.
+        Of a warm start: each seam with "" where its motion is that of the earlier program, bit for
+        bit, otherwise with why it is not. None without a warm start, and for files.
     unjudged : tuple of str
-        What nothing was asked of and a reader may take for judged; the verdict says it.
+        What is not judged although a reader may expect it; the verdict says it.
     """
 
     robot: RobotModel
@@ -77,7 +77,7 @@ class Program:
 
     @property
     def extent(self) -> str:
-        """How many seams it makes, in words."""
+        """The number of seams, in words."""
         count = len(self.order)
         return f"{count} seam{'s' * (count != 1)}"
 
@@ -93,7 +93,7 @@ class Program:
 
     @property
     def order(self) -> tuple[str, ...]:
-        """The names of the seams, as they are made."""
+        """The names of the seams, in order."""
         return tuple(step.name for step in self.steps if step.is_seam)
 
     @property
@@ -103,7 +103,7 @@ class Program:
 
     @property
     def plans(self) -> dict[str, Plan]:
-        """The plans of the seams by name, as they are made."""
+        """The plans of the seams by name, in order."""
         return {step.name: step.made for step in self.steps if isinstance(step.made, Plan)}
 
     @property
@@ -151,14 +151,14 @@ class Program:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """All obstacles in the end: those of the first step, and what each step leaves."""
+        """All obstacles at the end: those of the first step, and those that each step leaves."""
         first = self.steps[0].made.obstacles if self.steps else ()
         left = (item for step in self.steps for item in step.leaves)
         return tuple({item.name: item for item in (*first, *left)}.values())
 
     @property
     def verified(self) -> bool:
-        """Whether every seam is made, and everything is kept at all times."""
+        """Whether every seam has a motion, and all constraints are kept at all times."""
         return not self.failures
 
     @property
@@ -176,7 +176,7 @@ class Program:
 
     @property
     def summary(self) -> str:
-        """The verdict in short: of what is wrong the first."""
+        """The verdict, with only the first of several faults."""
         return self.verdict if self.verified else first_of(self.failures)
 
     @cached_property
@@ -195,43 +195,49 @@ class Program:
                 *([] if self.steps else ["there is no step"]),
                 *(step.trouble for step in self.steps if step.trouble),
                 *self._gaps(),
-                *self._left_out(),
-                *self._beyond(),
-                *self._not_as_asked(),
+                *self._unchecked(),
+                *self._misplaced_events(),
+                *self._against_specification(),
             ]
         )
 
     def _gaps(self) -> Iterator[str]:
         """Yield where the arm would jump, or does not rest."""
         named = ((step, CheckedMotion.of(f"'{step.name}'", step.made)) for step in self.steps)
-        pieces = [piece for _, piece in named if piece is not None]
-        for piece, end in [(each, 0) for each in pieces[:1]] + [(each, -1) for each in pieces[-1:]]:
-            yield from moving_end(self.robot, piece, end)
-        yield from gaps(self.robot, pieces)
+        motions = [motion for _, motion in named if motion is not None]
+        for motion, end in [
+            *((each, 0) for each in motions[:1]),
+            *((each, -1) for each in motions[-1:]),
+        ]:
+            yield from moving_end(self.robot, motion, end)
+        yield from gaps(self.robot, motions)
 
-    def _left_out(self) -> Iterator[str]:
-        """Yield what stands there and was not looked at."""
-        asked = self.specification
-        standing: dict[str, Obstacle] = {}
-        if asked is not None:
-            standing = {item.name: item for item in asked.obstacles}
-        apart = None if asked is None else asked.clearance or Clearance(distance=0.0)
+    def _unchecked(self) -> Iterator[str]:
+        """Yield steps that are not checked against an obstacle that is there by then."""
+        specification = self.specification
+        obstacles: dict[str, Obstacle] = {}
+        clearance = None
+        if specification is not None:
+            obstacles = {item.name: item for item in specification.obstacles}
+            clearance = specification.clearance or Clearance(distance=0.0)
         for step in self.steps:
-            met = step.meets(standing, apart)
-            if met:
-                yield f"'{step.name}' is not checked against '{met[0]}', which is there by then"
-            standing |= {item.name: item for item in step.leaves}
+            unchecked = step.unchecked(obstacles, clearance)
+            if unchecked:
+                yield (
+                    f"'{step.name}' is not checked against '{unchecked[0]}', which is there by then"
+                )
+            obstacles |= {item.name: item for item in step.leaves}
 
-    def _beyond(self) -> Iterator[str]:
-        """Yield events that are not while their step lasts."""
+    def _misplaced_events(self) -> Iterator[str]:
+        """Yield events at times outside of their step."""
         for step in self.steps:
             lasts = step.duration
             for event, at in step.events:
                 if not -_ROUNDING <= at <= lasts + _ROUNDING:
                     yield f"event '{event}' of '{step.name}' is at {at:.6g} s of {lasts:.6g} s"
 
-    def _not_as_asked(self) -> Iterator[str]:
-        """Yield what was asked for and is not so."""
+    def _against_specification(self) -> Iterator[str]:
+        """Yield where the steps differ from the specification."""
         if self.specification is not None:
             yield from self.specification.failures(self.robot, self.steps, self.missing)
 
@@ -256,7 +262,7 @@ class Program:
 _SHOWN = 12
 
 
-# When the steps of a program begin and end, and what happens when, as a table.
+# The times of steps and events, as a table.
 
 
 def write_timetable(program: Program, file: str | Path) -> None:

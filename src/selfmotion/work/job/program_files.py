@@ -20,7 +20,7 @@ FORMAT = 2
 def write_program(program: Program, file: Path) -> None:
     """Write a program to one file, atomically; see `Program.save`."""
     found = [step for step in program.steps if not step.is_missing]
-    asked = program.specification
+    specification = program.specification
     troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
     description: dict[str, Any] = {
         "steps": [_step_to_dict(step) for step in found],
@@ -28,7 +28,7 @@ def write_program(program: Program, file: Path) -> None:
         "bound": program.bound,
         "notes": list(program.notes),
         "unjudged": list(program.unjudged),
-        "specification": None if asked is None else asked.to_dict(),
+        "specification": None if specification is None else specification.to_dict(),
     }
     write_bundle(file, "program", FORMAT, description, [step.made for step in found])
 

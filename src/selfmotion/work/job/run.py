@@ -39,16 +39,16 @@ from selfmotion.planning.result import Move, arm_digest
 from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
-from selfmotion.work.job.files import Earlier, Shelf, check_earlier
-from selfmotion.work.job.growing import Growing
+from selfmotion.work.job.files import EarlierProgram, ResultCache, check_earlier
+from selfmotion.work.job.obstructing import ObstructingBuilder
 from selfmotion.work.job.order import EXACT
 from selfmotion.work.job.ordering import Ordering
 from selfmotion.work.job.program import Program
 from selfmotion.work.job.seam import Seam, Step
 from selfmotion.work.job.specification import Specification
-from selfmotion.work.job.work import Asked, Work, check_can_be_sent, seam_steps
+from selfmotion.work.job.work import JobSettings, Work, check_can_be_sent, seam_steps
 
-# From an order to a program: moves are planned, and the order again where they disappoint.
+# From an order to a program: moves are planned, and the order again where they take longer.
 
 # Orders that are tried at most, where the best order is computed exactly.
 _ORDERS = 200
@@ -76,16 +76,16 @@ class Builder:
         self._notes: list[str] = []
 
     def program(self) -> Program:
-        """Return the program; what could not be made is named."""
+        """Return the program; seams without a motion are named in it."""
         if any(seam.leaves for seam in self._ordering.seams):
-            return Growing(self._ordering, self._work, self._ends).program()
+            return ObstructingBuilder(self._ordering, self._work, self._ends).program()
         return self._of_moves()
 
     def _of_moves(self) -> Program:
         ordering, moves = self._ordering, dict[Pair, Move]()
         bound = ordering.best().bound
         best: tuple[float, tuple[int, ...]] = (np.inf, ())
-        exact = len(ordering.made) <= EXACT
+        exact = len(ordering.planned) <= EXACT
         for _ in range(_ORDERS if exact else _ORDERS_OF_MANY):
             found = ordering.best()
             if not found.states:
@@ -101,7 +101,7 @@ class Builder:
                 break
         states = best[1] or self._with_gaps(moves)
         return Program(
-            self._work.asked.robot,
+            self._work.settings.robot,
             tuple(self._steps(states, moves)),
             dict(ordering.missing),
             bound,
@@ -112,7 +112,7 @@ class Builder:
         """Return the order with the fewest moves that are not found."""
         for pair, move in moves.items():
             if not move.verified:
-                self._ordering.learn(*pair, _GAP)
+                self._ordering.record_time(*pair, _GAP)
         states = self._ordering.best().states
         self._plan([pair for pair in self._pairs(states) if pair not in moves], moves)
         return states
@@ -128,16 +128,16 @@ class Builder:
         wanted: Sequence[Pair],
         moves: dict[Pair, Move],
     ) -> None:
-        """Plan moves, and let the order know what they take."""
-        asked = [(*self._ends_of(pair), ()) for pair in wanted]
-        named = [self._ordering.name_of_move(*pair) for pair in wanted]
-        for pair, move in zip(wanted, self._work.moves(asked, named), strict=True):
+        """Plan moves, and record their times in the ordering."""
+        ends = [(*self._ends_of(pair), ()) for pair in wanted]
+        names = [self._ordering.name_of_move(*pair) for pair in wanted]
+        for pair, move in zip(wanted, self._work.moves(ends, names), strict=True):
             moves[pair] = move
             seconds = move.motion.duration if move.verified else np.inf
-            self._ordering.learn(*pair, seconds)
+            self._ordering.record_time(*pair, seconds)
             if not move.verified:
-                names = self._ordering.name_of_move(*pair)
-                self._notes.append(f"'{names}' is dropped: {move.trouble}")
+                name = self._ordering.name_of_move(*pair)
+                self._notes.append(f"'{name}' is dropped: {move.trouble}")
 
     def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
         """Return start and end of a move, (n,) each."""
@@ -145,7 +145,7 @@ class Builder:
         first = self._ends[0] if one is None else states[one].ends[1]
         last = self._ends[1] if other is None else states[other].ends[0]
         if first is None or last is None:
-            raise RuntimeError("no move leads to where nothing was asked for")
+            raise RuntimeError("a move has an end that is not given")
         return first, last
 
     def _cost(self, states: Sequence[int], moves: dict[Pair, Move]) -> float:
@@ -164,7 +164,7 @@ class Builder:
                 steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
             here = self._ordering.states[state]
             seam = self._ordering.seams[here.seam]
-            plan = self._ordering.made_of(state)
+            plan = self._ordering.plan_of(state)
             steps += seam_steps(seam, plan, here.turned, self._work)
         if None in by_last:
             steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
@@ -270,7 +270,7 @@ def plan_job(
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     listed = as_several(seams, "seams", Seam)
     _check_names(listed)
-    asked = Asked(
+    settings = JobSettings(
         robot,
         _checked_constraints(constraints),
         _checked_clearance(clearance),
@@ -282,14 +282,14 @@ def plan_job(
     clock = Deadline.after(deadline)
     told = clock.checked_by(obeying(progress))
     for seam in sorted(listed, key=_slowest):
-        check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
+        check_feeds(f"seam '{seam.name}'", [seam.path], [*settings.constraints, *seam.constraints])
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     if folder is not None or executor is not None:
         for seam in listed:
             check_can_be_sent(seam.costs or ())
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
-    moves = FreeMotions(robot, asked.of_moves(()), np.random.default_rng(0))
+    moves = FreeMotions(robot, settings.move_constraints(()), np.random.default_rng(0))
     for name, q in zip(("start", "end"), ends, strict=True):
         refused = "" if q is None else moves.refusal(q)
         if refused:
@@ -297,17 +297,17 @@ def plan_job(
     # Processes and schedulers wait for Ctrl-C themselves.
     held = nullcontext() if executor is not None else held_interruption()
     with held:
-        shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
+        cache = ResultCache(None if folder is None else as_path(folder), Tolerance(), {})
         specification = Specification(
             listed,
             not is_free,
             ends[0],
             ends[1],
-            asked.constraints,
-            asked.clearance,
+            settings.constraints,
+            settings.clearance,
             arm=arm_digest(robot),
         )
-        make = partial(Work, asked, shelf, executor, told)
+        make = partial(Work, settings, cache, executor, told)
         try:
             return _program(specification, make, ends, price, warm_start)
         except KeyboardInterrupt:
@@ -327,25 +327,25 @@ def _program(
     price: float,
     warm_start: Program | None,
 ) -> Program:
-    """Return the program of a job: of what is kept of an earlier one first, where there is one.
+    """Return the program of a job: first with the unchanged motions of an earlier one, if any.
 
-    `make` makes what plans seams and moves, with what is known of an earlier program.
+    `make` returns the `Work` that plans seams and moves, given the earlier program.
     """
     listed, is_free = specification.seams, not specification.in_order
     earlier, changed, why = None, dict[str, str](), ""
     work = make()
-    robot = work.asked.robot
+    robot = work.settings.robot
     if warm_start is not None:
         check_earlier(warm_start, robot)
-        earlier = Earlier(warm_start)
+        earlier = EarlierProgram(warm_start)
         again = make(earlier)
         as_before = earlier.order_of(listed) if is_free else None
         ordering = Ordering(as_before or listed, again, ends, price, is_free and not as_before)
         changed = ordering.changed
-        for program in _kept_first(ordering, again, ends, is_free):
+        for program in _unchanged_first(ordering, again, ends, is_free):
             program = replace(program, specification=specification)
             if program.verified:
-                return replace(program, kept=earlier.kept_in(program, changed, why))
+                return replace(program, kept=earlier.kept_seams(program, changed, why))
             why = why or program.summary
     ordering = Ordering(listed, work, ends, price, is_free)
     if not ordering.states:
@@ -354,24 +354,24 @@ def _program(
     program = replace(Builder(ordering, work, ends).program(), specification=specification)
     if earlier is None:
         return program
-    return replace(program, kept=earlier.kept_in(program, changed, why))
+    return replace(program, kept=earlier.kept_seams(program, changed, why))
 
 
-def _kept_first(
+def _unchanged_first(
     ordering: Ordering, work: Work, ends: tuple[Array | None, ...], is_free: bool
 ) -> Iterator[Program]:
-    """Yield programs with what is kept of an earlier one: as it was made there first.
+    """Yield programs with the unchanged motions of an earlier one.
 
-    In the order of that one, where it made the same seams; then in any; then with what is kept the
-    other way round as well. Where nothing is kept, only the first.
+    First in its order, where it has the same seams; then in any order; then with the unchanged
+    motions reversed as well. Where nothing is unchanged, only the first.
     """
     if not ordering.states:
         return
     yield Builder(ordering, work, ends).program()
-    if ordering.keeps and is_free and not ordering.is_free:
+    if ordering.has_unchanged and is_free and not ordering.is_free:
         ordering.free(order=True, directions=False)
         yield Builder(ordering, work, ends).program()
-    if ordering.keeps:
+    if ordering.has_unchanged:
         ordering.free(order=is_free, directions=True)
         yield Builder(ordering, work, ends).program()
 

@@ -16,7 +16,7 @@ from selfmotion.planning.result import Move, Plan, keeps_as_far
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import Cost
 from selfmotion.problem.problem import Problem, rest_orders
-from selfmotion.work.job.stops import Before
+from selfmotion.work.job.stops import Precedences
 
 # One step of a program: a seam, a move or a wait.
 
@@ -74,7 +74,7 @@ class Step:
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:
-        """The certificate of its plan."""
+        """The constraints of its plan or move."""
         made = self.made
         return made.constraints if isinstance(made, Move) else made.problem.all_constraints
 
@@ -86,22 +86,25 @@ class Step:
         check = self.made.certificate
         return "" if check.verified else f"seam '{self.name}': {check.verdict}"
 
-    def meets(self, standing: Mapping[str, Obstacle], apart: Clearance | None = None) -> list[str]:
-        """Return the names of what it is not checked against, though it stands there.
+    def unchecked(
+        self, obstacles: Mapping[str, Obstacle], clearance: Clearance | None = None
+    ) -> list[str]:
+        """Return the names of obstacles that it is not checked against.
 
-        With `apart`, at its distance or more: another requirement may be about the same bodies.
+        With `clearance`, not at its distance or more: another constraint may be about the same
+        bodies.
         """
-        bodies = self.made.obstacles if apart is None else self._kept_from(apart)
+        bodies = self.made.obstacles if clearance is None else self._bodies_kept_clear_of(clearance)
         known = {item.name: item for item in bodies}
         return [
             name
-            for name, item in standing.items()
+            for name, item in obstacles.items()
             if name not in self.may_meet and not _same(known.get(name), item)
         ]
 
-    def _kept_from(self, apart: Clearance) -> tuple[Obstacle, ...]:
-        """Return the bodies from which it keeps as far as a clearance asks, or farther."""
-        far = (item for item in self.constraints if keeps_as_far(item, apart))
+    def _bodies_kept_clear_of(self, clearance: Clearance) -> tuple[Obstacle, ...]:
+        """Return the bodies from which it keeps the distance of a clearance, or more."""
+        far = (item for item in self.constraints if keeps_as_far(item, clearance))
         return tuple(body for item in far if isinstance(item, Clearance) for body in item.obstacles)
 
 
@@ -212,12 +215,12 @@ class Seam:
         """Raise ProblemError where the tool moves at an end."""
         orders = rest_orders(self.path, Task.of(self.task))
         times = (0.0, self.path.duration)
-        for time, said, order in zip(times, ("begins", "ends"), orders, strict=True):
+        for time, verb, order in zip(times, ("begins", "ends"), orders, strict=True):
             speed, turning = map(float, np.linalg.norm(self.path.twist(time).reshape(2, 3), axis=1))
-            # Turning that the task leaves free is not asked of the arm.
+            # Rotation that the task leaves free is not the arm's.
             if speed > REST_SPEED or order == 0:
                 raise ProblemError(
-                    f"{what}: its path {said} at {speed:.3g} m/s and {turning:.3g} rad/s, expected "
+                    f"{what}: its path {verb} at {speed:.3g} m/s and {turning:.3g} rad/s, expected "
                     f"rest: time_law='minimum_jerk', Feed(path, …), or section_at_rest(path)"
                 )
 
@@ -310,11 +313,11 @@ def _names(given: object, what: str) -> tuple[str, ...]:
     return tuple(given)
 
 
-def waiting(seams: Sequence[Seam]) -> Before:
+def precedences(seams: Sequence[Seam]) -> Precedences:
     """Return the precedences of seams, by their places in the list."""
     places = {seam.name: k for k, seam in enumerate(seams)}
     after, after_any = (
         [frozenset(places[name] for name in wanted if name in places) for wanted in several]
         for several in ([seam.after for seam in seams], [seam.after_any for seam in seams])
     )
-    return Before(after, after_any)
+    return Precedences(after, after_any)

@@ -42,13 +42,12 @@ class Specification:
     start, end : (n,) or None
         Where the program begins and ends; None for anywhere.
     constraints : tuple of Constraint
-        What all seams and moves have to keep.
+        Of all seams and moves.
     clearance : Clearance or None
     tolerance : Tolerance
-        What each seam may miss its path by.
+        Largest deviation of each seam from its path.
     arm : str
-        What tells the arm with its tool, reference and limits from others (`arm_digest`); "" for
-        any.
+        Digest of the arm with its tool, reference and limits (`arm_digest`); "" for any arm.
     """
 
     seams: tuple[Seam, ...]
@@ -62,13 +61,13 @@ class Specification:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """The obstacles that are there from the beginning."""
+        """The obstacles that are there from the start."""
         return () if self.clearance is None else self.clearance.obstacles
 
     def failures(
         self, robot: RobotModel, steps: Sequence[Step], missing: Mapping[str, str]
     ) -> Iterator[str]:
-        """Yield what of it steps do not keep, but for seams that are said to be missing."""
+        """Yield where steps differ from it, except for seams that are known to be missing."""
         if self.arm and self.arm != arm_digest(robot):
             yield (
                 f"arm '{robot.name}' with tool '{robot.tool}' is not what was asked for, or has "
@@ -94,7 +93,7 @@ class Specification:
                 yield from self._seam(robot, step, step.made)
                 following = steps[number + 1] if number + 1 < len(steps) else None
                 yield from _wait(step, following, seams[step.name].wait)
-        yield from self._kept(robot, steps)
+        yield from self._constraints(robot, steps)
 
     def _order(self, made: Sequence[str], seams: Mapping[str, Seam]) -> Iterator[str]:
         if self.in_order and made != [name for name in seams if name in made]:
@@ -110,23 +109,23 @@ class Specification:
     def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield faults of the start and the end, without those of moves that were not found."""
         for q, at in ((self.start, 0), (self.end, -1)):
-            piece = CheckedMotion.of("it", steps[at].made) if steps and q is not None else None
-            if piece is not None and q is not None:
-                yield from elsewhere(robot, piece, at, q)
+            motion = CheckedMotion.of("it", steps[at].made) if steps and q is not None else None
+            if motion is not None and q is not None:
+                yield from elsewhere(robot, motion, at, q)
 
     def _seam(self, robot: RobotModel, step: Step, plan: Plan) -> Iterator[str]:
         """Yield where a seam's step is not what was asked for."""
         seam = next(item for item in self.seams if item.name == step.name)
         if step.turned and not seam.either_way:
             yield f"seam '{seam.name}' is made from its end to its start"
-        kept = [item for item in seam.constraints if item.applies(robot)]
+        constraints = [item for item in seam.constraints if item.applies(robot)]
         turned = (item.moved(reversing(seam.path.duration)) for item in seam.relaxations)
-        asked = MotionSpecification(
+        specification = MotionSpecification(
             robot,
             Reversed(seam.path) if step.turned else seam.path,
             Task.of(seam.task),
             [item for item in turned if item] if step.turned else seam.relaxations,
-            kept,
+            constraints,
             tolerance=self.tolerance,
         )
         others = [
@@ -134,15 +133,15 @@ class Specification:
             (_bodies(step.leaves) == _bodies(seam.leaves), "it leaves something else"),
             (set(step.may_meet) <= set(seam.may_meet), "it may meet more"),
         ]
-        for text in (*asked.failures(plan), *(text for same, text in others if not same)):
+        for text in (*specification.failures(plan), *(text for same, text in others if not same)):
             yield f"seam '{seam.name}' is not what was asked for: {text}"
 
-    def _kept(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
-        """Yield steps that are judged by less than what all of them have to keep."""
+    def _constraints(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
+        """Yield steps that are not judged by all constraints of the job."""
         wanted = [item for item in self.constraints if item.applies(robot) and not one_way(item)]
-        apart = self.clearance if robot.urdf.has_collisions or self.obstacles else None
+        clearance = self.clearance if robot.urdf.has_collisions or self.obstacles else None
         for step in steps:
-            for text in not_judged_by(step.constraints, wanted, apart):
+            for text in not_judged_by(step.constraints, wanted, clearance):
                 yield f"'{step.name}': {text}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -163,15 +162,15 @@ class Specification:
         """Return the specification that `to_dict` described."""
         ends = (values[end] for end in ("start", "end"))
         start, end = (None if q is None else robot.configuration(q) for q in ends)
-        apart = values["clearance"]
+        clearance = values["clearance"]
         return cls(
             tuple(_seam_from_dict(item, robot) for item in values["seams"]),
             bool(values["in_order"]),
             start,
             end,
             tuple(restore(Constraint, item) for item in values["constraints"]),
-            None if apart is None else restore(Constraint, apart),
-            # Files of before say none: then it is the usual one.
+            None if clearance is None else restore(Constraint, clearance),
+            # Files of earlier versions have none: then it is the usual one.
             Tolerance(**values.get("tolerance", {})),
             str(values.get("arm", "")),
         )

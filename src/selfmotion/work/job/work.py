@@ -1,6 +1,6 @@
-"""Work of a job: plans of seams and moves, in this or other processes, saved when finished.
+"""Tasks of a job: plans of seams and moves, in this or other processes, stored when finished.
 
-A piece of work depends on its parameters alone, its random numbers too: the result is the same in
+The result of a task, random numbers included, depends on its parameters alone. It is the same in
 every process, and in any order.
 """
 
@@ -40,22 +40,22 @@ from selfmotion.problem.problem import (
     problem_from_dict,
     problem_to_dict,
 )
-from selfmotion.work.job.files import Earlier, Shelf, leads, way_along
+from selfmotion.work.job.files import EarlierProgram, ResultCache, adapted_waypoints, satisfies
 from selfmotion.work.job.seam import Seam, Step, backwards
 
-# Clearances that are remembered: of a seam, and of the moves around it.
-_REMEMBERED = 8
+# Clearances that are kept in memory: of a seam, and of the moves around it.
+_CACHED_CLEARANCES = 8
 
 
-# A piece of work by its parameters, and its result.
+# A task by its parameters, and its result.
 _Task = Mapping[str, Any]
-_Made = TypeVar("_Made")
-# Which task is finished, and what came of it.
+_Result = TypeVar("_Result")
+# The number of a finished task, and its result.
 _Finished = tuple[int, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class JobSettings:
     """The settings that all seams and moves of a job share.
 
     Attributes
@@ -76,82 +76,85 @@ class Asked:
     branches: int
     move_seconds: float
     seed: int
-    _apart: dict[tuple[str, ...], Clearance] = field(default_factory=dict, repr=False)
+    _clearances: dict[tuple[str, ...], Clearance] = field(default_factory=dict, repr=False)
 
-    def apart(self, standing: Sequence[Any]) -> Clearance | None:
-        """Return the clearance with what stands there by then as well."""
-        if not standing:
+    def clearance_from(self, obstacles: Sequence[Any]) -> Clearance | None:
+        """Return the clearance, with further obstacles."""
+        if not obstacles:
             return self.clearance
-        key = tuple(item.name for item in standing)
-        if key not in self._apart:
-            # Made once for a seam and the move to it: bodies take a while.
-            if len(self._apart) >= _REMEMBERED:
-                self._apart.clear()
+        key = tuple(item.name for item in obstacles)
+        if key not in self._clearances:
+            # Made once for a seam and the move to it, since collision models take time.
+            if len(self._clearances) >= _CACHED_CLEARANCES:
+                self._clearances.clear()
             known = self.clearance or Clearance(distance=0.0)
-            obstacles = (*known.obstacles, *standing)
-            self._apart[key] = replace(known, obstacles=obstacles, srdf=None)
-        return self._apart[key]
+            obstacles = (*known.obstacles, *obstacles)
+            self._clearances[key] = replace(known, obstacles=obstacles, srdf=None)
+        return self._clearances[key]
 
-    def problem(self, seam: Seam, standing: Sequence[Any] = (), turned: bool = False) -> Problem:
-        """Return the problem of a seam, with what stands there by then."""
+    def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
+        """Return the problem of a seam, with further obstacles."""
         given = Problem(
             self.robot,
             seam.path,
             seam.task,
             constraints=(*self.constraints, *seam.constraints),
             relaxations=tuple(seam.relaxations),
-            clearance=self.apart(standing),
+            clearance=self.clearance_from(obstacles),
         )
         if seam.costs is not None:
             given = replace(given, costs=tuple(seam.costs))
         return backwards(given) if turned else given
 
-    def of_moves(self, standing: Sequence[Any]) -> tuple[Constraint, ...]:
-        """Return the constraints of moves, with the obstacles that are there by then."""
-        apart = self.apart(standing)
-        has_bodies = self.robot.urdf.has_collisions or bool(apart and apart.obstacles)
-        return self.constraints if apart is None or not has_bodies else (*self.constraints, apart)
+    def move_constraints(self, obstacles: Sequence[Any]) -> tuple[Constraint, ...]:
+        """Return the constraints of moves, with further obstacles."""
+        clearance = self.clearance_from(obstacles)
+        has_bodies = self.robot.urdf.has_collisions or bool(clearance and clearance.obstacles)
+        if clearance is None or not has_bodies:
+            return self.constraints
+        return (*self.constraints, clearance)
 
 
 class Work:
-    """Does the work of a job.
+    """Plans the seams and moves of a job.
 
     Parameters
     ----------
-    asked : Asked
-    shelf : Shelf
+    settings : JobSettings
+    cache : ResultCache
     executor : Executor or None
-        None does all here.
+        None for this process.
     progress : Progress
-    earlier : Earlier, optional
-        Where ways of moves begin.
+    earlier : EarlierProgram, optional
+        Whose motions moves begin with.
     """
 
     def __init__(
         self,
-        asked: Asked,
-        shelf: Shelf,
+        settings: JobSettings,
+        cache: ResultCache,
         executor: Executor | None,
         progress: Progress,
-        earlier: Earlier | None = None,
+        earlier: EarlierProgram | None = None,
     ) -> None:
-        self.asked, self._shelf, self._executor = asked, shelf, executor
+        self.settings, self._cache, self._executor = settings, cache, executor
         self.tell, self.earlier = progress, earlier
 
-    def kept(self, seam: Seam) -> tuple[Plan | None, str]:
-        """Return the earlier plan of a seam of which the same is asked, or why there is none."""
+    def unchanged_plan(self, seam: Seam) -> tuple[Plan | None, str]:
+        """Return the earlier plan of a seam that has not changed, or why there is none."""
         if self.earlier is None:
             return None, ""
-        asked, known = self.asked, self.earlier.plan_of(seam)
-        problem = asked.problem(seam, turned=known is not None and known[1])
-        return self.earlier.kept(seam, problem, asked.constraints, asked.clearance)
+        settings, known = self.settings, self.earlier.plan_of(seam)
+        problem = settings.problem(seam, turned=known is not None and known[1])
+        constraints, clearance = settings.constraints, settings.clearance
+        return self.earlier.unchanged_plan(seam, problem, constraints, clearance)
 
     def like_before(
         self, wanted: Sequence[tuple[Seam, Problem, Plan | None]]
     ) -> list[tuple[list[Plan], str]]:
-        """Return the verified plan of each problem that begins at the motion of another one.
+        """Return for each problem the verified plan that begins at another plan's motion.
 
-        Where there is none, or no other one, `branches` of it.
+        Where there is no such plan, the `branches` of the problem.
         """
         tasks = self._branches([(seam, problem) for seam, problem, _ in wanted])
         likes = [{} if plan is None else {"like": plan} for _, _, plan in wanted]
@@ -163,7 +166,7 @@ class Work:
     ) -> list[tuple[list[Plan], str]]:
         """Return verified plans of problems in different branches, and why there are none.
 
-        Their starts keep clear of all that is asked by what is `allowed`, where something is.
+        Their starts keep the constraints of the problem `allowed`, where one is given.
         """
         tasks = self._branches(wanted, allowed)
         return self._plans(tasks, "seam" if allowed is None else "other ways")
@@ -175,8 +178,8 @@ class Work:
             {
                 "problem": problem,
                 "name": seam.name,
-                "count": self.asked.branches,
-                "seed": [self.asked.seed, _number(seam.name.encode())],
+                "count": self.settings.branches,
+                "seed": [self.settings.seed, _number(seam.name.encode())],
                 **({} if allowed is None else {"allowed": allowed}),
             }
             for seam, problem in wanted
@@ -193,66 +196,68 @@ class Work:
     def moves(
         self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]], names: Sequence[str]
     ) -> list[Move]:
-        """Return moves from configurations (n,) to others, with what stands there each time.
+        """Return moves between configurations (n,), with the further obstacles of each.
 
-        Progress tells their `names`.
+        Progress shows their `names`.
         """
-        tasks, before = list[_Task](), list[Move | None]()
-        for (first, last, standing), name in zip(wanted, names, strict=True):
+        tasks, earlier = list[_Task](), list[Move | None]()
+        for (first, last, obstacles), name in zip(wanted, names, strict=True):
             ends = np.stack([first, last])
             known = None if self.earlier is None else self.earlier.move_like(ends)
-            before.append(known)
+            earlier.append(known)
             tasks.append(
                 {
-                    "arm": (self.asked.robot, self.asked.of_moves(standing)),
+                    "arm": (self.settings.robot, self.settings.move_constraints(obstacles)),
                     "named": name,
                     "ends": ends,
-                    "seconds": self.asked.move_seconds,
-                    "seed": [self.asked.seed, _number(ends.tobytes())],
-                    **({} if known is None else {"way": way_along(known.motion, ends)}),
+                    "seconds": self.settings.move_seconds,
+                    "seed": [self.settings.seed, _number(ends.tobytes())],
+                    **({} if known is None else {"way": adapted_waypoints(known.motion, ends)}),
                 }
             )
-        shelf = self._shelf
-        files = [shelf.file("move", partial(_move_asked, task), *task["arm"]) for task in tasks]
-        kept = list[Move | None]()
-        for file, task, known in zip(files, tasks, before, strict=True):
+        cache = self._cache
+        files = [
+            cache.file("move", partial(_description_of_move, task), *task["arm"]) for task in tasks
+        ]
+        stored = list[Move | None]()
+        for file, task, known in zip(files, tasks, earlier, strict=True):
             missing = _missing(task, "")
-            # Judged by what is asked now: files of bodies may have changed.
-            arm, asked = missing.robot, missing.constraints
-            again = None if known is None else replace(known, robot=arm, constraints=asked)
-            same = again is not None and leads(again, missing, task["ends"])
-            kept.append(again if same else shelf.move(file, missing, task["ends"]))
-        return self._finished("move", "move", tasks, files, kept, shelf.keep_move)
+            # Judged by the present constraints: files of bodies may have changed.
+            arm, constraints = missing.robot, missing.constraints
+            again = None if known is None else replace(known, robot=arm, constraints=constraints)
+            same = again is not None and satisfies(again, missing, task["ends"])
+            stored.append(again if same else cache.move(file, missing, task["ends"]))
+        return self._results_of("move", "move", tasks, files, stored, cache.store_move)
 
     def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:
-        shelf = self._shelf
+        cache = self._cache
         files = [
-            shelf.file(
+            cache.file(
                 f"{stage} {task['name']}",
-                partial(_plans_asked, task),
-                self.asked.robot,
+                partial(_description_of_plans, task),
+                self.settings.robot,
                 _constraints_of(task),
             )
             for task in tasks
         ]
         both = zip(files, tasks, strict=True)
-        kept = [shelf.plans(file, task["problem"]) for file, task in both]
-        return self._finished("plans", stage, tasks, files, kept, shelf.keep_plans)
+        stored = [cache.plans(file, task["problem"]) for file, task in both]
+        return self._results_of("plans", stage, tasks, files, stored, cache.store_plans)
 
-    def _finished(
+    def _results_of(
         self,
         kind: str,
         stage: str,
         tasks: Sequence[_Task],
         files: Sequence[Path | None],
-        kept: Sequence[_Made | None],
-        keep: Callable[[Path | None, _Made], None],
-    ) -> list[_Made]:
-        """Return the results of tasks: saved ones, and new ones, which are saved when finished."""
-        found = {k: known for k, known in enumerate(kept) if known is not None}
+        stored: Sequence[_Result | None],
+        store: Callable[[Path | None, _Result], None],
+    ) -> list[_Result]:
+        """Return the results of tasks: stored ones, and new ones, stored when finished."""
+        found = {k: known for k, known in enumerate(stored) if known is not None}
         todo = {k: task for k, task in enumerate(tasks) if k not in found}
-        with closing(self._done(todo, kind)) as fresh:
-            # In other processes all are begun at once.
+        with closing(self._computed(todo, kind)) as new:
+            # In other processes all begin at once, so that none is under way alone.
             here = [] if self._executor is not None else list(todo)
             for number in range(1, len(tasks) + 1):
                 k = number - 1 - (len(tasks) - len(todo))
@@ -260,19 +265,19 @@ class Work:
                 about = named.get("named", named.get("name", ""))
                 self.tell(f"{stage} '{about}'" if about else stage, number, len(tasks))
                 if number > len(tasks) - len(todo):
-                    k, made = next(fresh)
-                    keep(files[k], made)
-                    found[k] = made
+                    k, result = next(new)
+                    store(files[k], result)
+                    found[k] = result
         return [found[k] for k in range(len(tasks))]
 
-    def _done(self, tasks: Mapping[int, _Task], kind: str) -> Generator[_Finished, None, None]:
+    def _computed(self, tasks: Mapping[int, _Task], kind: str) -> Generator[_Finished, None, None]:
         """Yield task and result as each is finished; other processes begin all at once."""
         if self._executor is None:
             for k, task in tasks.items():
-                yield k, _move_here(task) if kind == "move" else _plans_here(task)
+                yield k, _compute_move(task) if kind == "move" else _compute_plans(task)
             return
         known: dict[str, Any] = {}
-        sent = {self._sent(task, kind): k for k, task in tasks.items()}
+        sent = {self._submitted(task, kind): k for k, task in tasks.items()}
         try:
             for future in as_completed(sent):
                 found, why = future.result()
@@ -287,15 +292,17 @@ class Work:
             for future in sent:
                 future.cancel()
 
-    def _sent(self, task: _Task, kind: str) -> "Future[Any]":
+    def _submitted(self, task: _Task, kind: str) -> "Future[Any]":
         if self._executor is None:
             raise RuntimeError("there is no other process to send to")
         if kind == "move":
-            files = self._shelf.files(*task["arm"])
-            return self._executor.submit(_move_there, {**_move_asked(task), "files": files})
-        files = self._shelf.files(self.asked.robot, _constraints_of(task))
+            files = self._cache.files(*task["arm"])
+            description = _description_of_move(task)
+            return self._executor.submit(_move_for_parent, {**description, "files": files})
+        files = self._cache.files(self.settings.robot, _constraints_of(task))
         like = {"like": _packed(task["like"])} if "like" in task else {}
-        return self._executor.submit(_plans_there, {**_plans_asked(task), **like, "files": files})
+        description = {**_description_of_plans(task), **like, "files": files}
+        return self._executor.submit(_plans_for_parent, description)
 
 
 def check_can_be_sent(costs: Sequence[Any]) -> None:
@@ -318,24 +325,24 @@ def _number(data: bytes) -> int:
     return zlib.crc32(data)
 
 
-def _plans_here(task: _Task) -> tuple[list[Plan], str]:
+def _compute_plans(task: _Task) -> tuple[list[Plan], str]:
     problem = task["problem"]
     with one_blas_thread():
         if "like" in task:
-            made = like_before(problem, task["like"])
-            if made is not None:
-                return [made], ""
+            plan = like_before(problem, task["like"])
+            if plan is not None:
+                return [plan], ""
         if "near" not in task:
             generator = np.random.default_rng(task["seed"])
             return branches(problem, task["count"], generator, task.get("allowed"))
         start = near_start(problem, np.array(task["near"]))
         if start is None:
             return [], "no configuration near"
-        made, why = from_start(problem, start)
-        return ([], why) if made is None else ([made], "")
+        plan, why = from_start(problem, start)
+        return ([], why) if plan is None else ([plan], "")
 
 
-def _move_here(task: _Task) -> Move:
+def _compute_move(task: _Task) -> Move:
     robot, constraints = task["arm"]
     first, last = task["ends"]
     generator = np.random.default_rng(task["seed"])
@@ -349,62 +356,62 @@ def _missing(task: _Task, trouble: str) -> Move:
     return Move(robot, constraints_of_moves(robot, constraints), None, trouble)
 
 
-def _plans_asked(task: _Task) -> dict[str, Any]:
+def _description_of_plans(task: _Task) -> dict[str, Any]:
     problems = [name for name in ("problem", "allowed") if name in task]
-    asked = {**task, **{name: problem_to_dict(task[name]) for name in problems}}
+    description = {**task, **{name: problem_to_dict(task[name]) for name in problems}}
     if "like" in task:
         motion = task["like"].trajectory
-        asked["like"] = digest_of(motion.t, motion.q)
-    return asked
+        description["like"] = digest_of(motion.t, motion.q)
+    return description
 
 
-def _move_asked(task: _Task) -> dict[str, Any]:
+def _description_of_move(task: _Task) -> dict[str, Any]:
     # The name is not part of the key.
-    asked = {key: value for key, value in task.items() if key != "named"}
-    return {**asked, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
+    description = {key: value for key, value in task.items() if key != "named"}
+    return {**description, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
 
 
 # Arms and bodies of tasks done before in this process.
 _arms = ArmCache()
 
 
-def _plans_there(task: _Task) -> tuple[list[bytes], str]:
-    """Do a task in another process: plans as the bytes of their files."""
+def _plans_for_parent(task: _Task) -> tuple[list[bytes], str]:
+    """Return the plans of a task, in another process, as the bytes of their files."""
     known = _arms.of(task["files"])
     problems = [name for name in ("problem", "allowed") if name in task]
-    made: dict[str, Any] = {name: problem_from_dict(task[name], known) for name in problems}
+    values: dict[str, Any] = {name: problem_from_dict(task[name], known) for name in problems}
     if "like" in task:
-        made["like"] = _unpacked(task["like"], load_plan, known)
-    found, reason = _plans_here({**task, **made})
+        values["like"] = _unpacked(task["like"], load_plan, known)
+    found, reason = _compute_plans({**task, **values})
     return [_packed(plan) for plan in found], reason
 
 
-def _move_there(task: _Task) -> tuple[bytes, str]:
+def _move_for_parent(task: _Task) -> tuple[bytes, str]:
     known = _arms.of(task["files"])
     arm, ends = arm_and_constraints(task["arm"], known), np.array(task["ends"])
-    move = _move_here({**task, "arm": arm, "ends": ends})
+    move = _compute_move({**task, "arm": arm, "ends": ends})
     return (b"" if move.trajectory is None else _packed(move)), move.trouble
 
 
-def _packed(made: Plan | Move) -> bytes:
+def _packed(result: Plan | Move) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "made.npz")
-        made.save(file)
+        file = Path(folder, "result.npz")
+        result.save(file)
         return file.read_bytes()
 
 
 def _unpacked(data: bytes, load: Any, known: dict[str, Any]) -> Any:
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "made.npz")
+        file = Path(folder, "result.npz")
         file.write_bytes(data)
         return load(file, known=known)
 
 
-# The steps of a program that a seam becomes.
+# The steps of a program for a seam.
 
 
 def seam_steps(
-    seam: Seam, plan: Plan, turned: bool, work: Work, standing: Sequence[Obstacle] = ()
+    seam: Seam, plan: Plan, turned: bool, work: Work, obstacles: Sequence[Obstacle] = ()
 ) -> list[Step]:
     """Return the steps of a seam: itself, and the wait after it."""
     steps = [
@@ -420,9 +427,9 @@ def seam_steps(
     if seam.wait > 0.0:
         q = np.tile(plan.trajectory.q[-1], (2, 1))
         times, names = np.array([0.0, seam.wait]), plan.robot.joint_names
-        still = Trajectory(times, q, np.zeros_like(q), names, np.zeros_like(q))
-        # The obstacles that it leaves are there by then.
+        at_rest = Trajectory(times, q, np.zeros_like(q), names, np.zeros_like(q))
+        # The obstacles that it leaves are there during the wait.
         left = [item for item in seam.leaves if item.name not in seam.may_meet]
-        wait = Move(plan.robot, work.asked.of_moves((*standing, *left)), still)
+        wait = Move(plan.robot, work.settings.move_constraints((*obstacles, *left)), at_rest)
         steps.append(Step(f"{seam.name}, wait", wait, may_meet=tuple(seam.may_meet)))
     return steps

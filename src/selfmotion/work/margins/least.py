@@ -1,9 +1,10 @@
-"""By how much bodies may be displaced while a motion goes on, proved at all times.
+"""By how much bodies may be displaced during a motion, proved at all times.
 
-At a time and for one pair, `Separation.least` bounds what is left of the distance after all
-displacements of a size. Between two times that changes by no more than the ways of the joints times
-their levers, as in the certificate (`certificate.separation`). So the middle of an interval decides
-about all of it. Intervals on which it does not are halved, the pair with the least first.
+At one time and for one pair, `Separation.least` bounds the distance that remains after any
+displacement of a size. Between two times this distance changes by no more than the path lengths of
+the joints times their lever arms, as in the certificate (`certificate.separation`). So a bound in
+the middle of an interval can decide the whole interval. Undecided intervals are halved, the pair
+with the smallest bound first.
 """
 
 from collections.abc import Callable
@@ -19,11 +20,11 @@ from selfmotion.model.motion import Trajectory
 _FIRST = 32
 # Bisections of each at most.
 _DEPTH = 40
-# Share of the bound at single times that a proof may lose.
+# Share of the bound at single times that a proof may fall short of it.
 _SHARE = 0.02
-# Relative accuracy to which a bound is solved for.
-_EXACT = 1e-4
-# Rounds of that at most.
+# Relative accuracy of a bound.
+_ACCURACY = 1e-4
+# Rounds of its search, at most.
 _ROUNDS = 12
 # Sections of each round.
 _PARTS = 16
@@ -31,7 +32,7 @@ _PARTS = 16
 
 @dataclass(frozen=True)
 class Size:
-    """How large displacements are: all up to both, in any direction.
+    """Largest translation and rotation of displacements, both at once and in any direction.
 
     Attributes
     ----------
@@ -47,19 +48,19 @@ class Size:
 
 @dataclass(frozen=True, eq=False)
 class Least:
-    """By how much bodies may be displaced.
+    """The largest displacement that is proved.
 
     Attributes
     ----------
     scale : float
-        What a `Size` may be multiplied by; proved.
+        Proved factor of a `Size`.
     pair : tuple of str
-        What meets first, the displaced body first; empty where nothing does.
+        The bodies that would collide first, the displaced one first; empty for none.
     time : float
-        When [s].
+        Of that collision [s].
     normal, moment : (3,)
-        In which direction, and about what, times its lever [m], the displaced body meets the other
-        one; in world axes.
+        Translation direction, and rotation axis times its lever arm [m], by which the displaced
+        body approaches the other one; in world axes.
     """
 
     scale: float
@@ -72,9 +73,9 @@ class Least:
 def least_scale(
     bodies: DisplacedBodies, motion: Trajectory, size: Size, left: float, most: float
 ) -> Least:
-    """Return by what displacements of a size may be multiplied, up to `most`.
+    """Return the largest factor of a displacement, up to `most`, that leaves bodies apart.
 
-    Afterwards no pair of a displaced and another body is nearer than `left` [m] at any time.
+    No pair of a displaced and another body is then nearer than `left` [m] at any time.
     """
     if not bodies.pairs:
         return Least(most)
@@ -119,51 +120,51 @@ class _Search:
 
     @property
     def _goal(self) -> float:
-        """The margin that is enough to be proved."""
+        """The factor that is enough to prove."""
         return (1.0 - _SHARE) * self._best.scale
 
-    def _levers(self) -> Array:
-        """Return the pairs' levers (P, n) while bodies are displaced as far as is in question."""
-        aside = self._size.position + self._size.rotation * self._bodies.lever_arms
+    def _lever_arms(self) -> Array:
+        """Return lever arms of joints for pairs (P, n), with bodies displaced by the best scale."""
+        displaced = self._size.position + self._size.rotation * self._bodies.lever_arms
         model = self._bodies.model
-        return model.pair_levers_up_to(self._farthest, self._best.scale * aside)
+        return model.pair_levers_up_to(self._farthest, self._best.scale * displaced)
 
     def narrowed(self, open_: _Open) -> _Open:
-        """Look at the middles of intervals; return the halves of those that are left."""
+        """Bound the middles of intervals; return the halves of undecided ones."""
         middle = 0.5 * (open_.early + open_.late)
-        ways = self._motion.travelled(np.concatenate([open_.early, middle, open_.late]))
-        early, here, late = np.split(ways, 3)
-        made = np.maximum(here - early, late - here)
-        slack = np.einsum("in,in->i", made, self._levers()[open_.pairs])
+        lengths = self._motion.travelled(np.concatenate([open_.early, middle, open_.late]))
+        early, here, late = np.split(lengths, 3)
+        travelled = np.maximum(here - early, late - here)
+        slack = np.einsum("in,in->i", travelled, self._lever_arms()[open_.pairs])
         times, row = np.unique(middle, return_inverse=True)
         q = self._motion(times)
-        quick = self._quick(q, row, open_.pairs, slack)
-        kept = []
+        quick = self._bounds_by_boxes(q, row, open_.pairs, slack)
+        undecided = []
         for k in np.argsort(quick, kind="stable").tolist():
             if quick[k] >= self._goal:
                 self._proved = min(self._proved, float(quick[k]))
-            elif not self._settles(q[row[k]], float(middle[k]), int(open_.pairs[k]), slack[k]):
-                kept.append(k)
-        rows = np.array(kept, dtype=np.int64)
+            elif not self._decides(q[row[k]], float(middle[k]), int(open_.pairs[k]), slack[k]):
+                undecided.append(k)
+        rows = np.array(undecided, dtype=np.int64)
         left = _Open(open_.early[rows], open_.late[rows], open_.pairs[rows])
         if not self._best.scale > 0.0:
             # Nothing is left to be proved.
             return replace(left, early=left.early[:0], late=left.late[:0], pairs=left.pairs[:0])
         return left.halves()
 
-    def _quick(self, q: Array, row: Ints, pairs: Ints, slack: Array) -> Array:
+    def _bounds_by_boxes(self, q: Array, row: Ints, pairs: Ints, slack: Array) -> Array:
         """Return lower bounds of the scales by boxes around the bodies (I,)."""
         size, bodies = self._size, self._bodies
         rates = np.full((len(q), len(bodies.pairs)), size.position)
         if size.rotation:
             others = [bodies.other_lever_arms(each) for each in q]
             rates += size.rotation * np.minimum(others, bodies.lever_arms)
-        apart = bodies.model.hulls.lower_bounds(q) - self._left
-        found: Array = (apart[row, pairs] - slack) / np.maximum(rates[row, pairs], 1e-12)
+        room = bodies.model.hulls.lower_bounds(q) - self._left
+        found: Array = (room[row, pairs] - slack) / np.maximum(rates[row, pairs], 1e-12)
         return np.clip(found, 0.0, self._best.scale)
 
-    def _settles(self, q: Array, time: float, pair: int, slack: float) -> bool:
-        """Look at a pair at one time; return whether enough is proved around it."""
+    def _decides(self, q: Array, time: float, pair: int, slack: float) -> bool:
+        """Measure a pair at one time; return whether that proves enough around it."""
         found, size = self._bodies.at(q, pair), self._size
 
         def left(scales: Array) -> Array:
@@ -185,13 +186,13 @@ class _Search:
         return True
 
     def found(self, open_: _Open) -> Least:
-        """Return the proved margin while some intervals are undecided."""
+        """Return what is proved; a scale of 0 while intervals are undecided."""
         scale = min(self._proved, self._best.scale)
         return replace(self._best, scale=0.0 if len(open_.pairs) else max(scale, 0.0))
 
 
 def _largest(left: Callable[[Array], Array], most: float) -> float:
-    """Return the largest scale up to `most`, from below, to which nothing is short; 0 for none."""
+    """Return a scale up to `most`, from below, up to which `left` is not negative; 0 for none."""
     low, high = 0.0, most
     for _ in range(_ROUNDS):
         scales = np.linspace(low, high, _PARTS + 1)
@@ -202,6 +203,6 @@ def _largest(left: Callable[[Array], Array], most: float) -> float:
         if not short[0]:
             return low
         low, high = float(scales[short[0] - 1]), float(scales[short[0]])
-        if high - low <= _EXACT * high:
+        if high - low <= _ACCURACY * high:
             break
     return low

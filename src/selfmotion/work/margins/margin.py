@@ -1,4 +1,4 @@
-"""By how much part, tool and base may be displaced before a program fails that runs unchanged."""
+"""By how much part, tool and base may be displaced while the joint motion stays the same."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ def margin(
     plan : Plan
         A verified one.
     tolerance : Tolerance, optional
-        What the process lets the tool miss its path by; in the rows that the task prescribes, and
-        beyond what is relaxed. By default only clearances are judged.
+        Deviation of the tool from its path that the process allows, in the rows that the task
+        prescribes, and in addition to relaxations. By default only clearances are judged.
     clearance : float
-        What has to be left between bodies [m]; by default they may come near but not meet.
+        Distance that has to remain between bodies [m]; by default they must not meet.
     part : sequence of str, optional
-        What belongs to the part. By default all obstacles that stand, or are carried, where the
-        path is: never less than those that do.
+        The obstacles of the part. By default all that are fixed, or are carried, in the frame of
+        the path; others may be added, not left out.
     tool : sequence of str, optional
-        What is displaced with the tool tip. By default all that the tool's joint carries; of a
-        tool that stands in the world, the links there that carry no joint.
+        Links that are displaced with the tool tip. By default all that the tool's joint carries; of
+        a tool that is fixed in the world, the links there that carry no joint.
     center : (3,), optional
-        What the part turns about, in the frame of the path [m]; by default the middle of the path.
-        The base turns about its own origin, the tool about that of the joint that carries it.
+        Centre of the part's rotations, in the frame of the path [m]; by default the middle of the
+        path. The base turns about its own origin, the tool about that of the joint that carries it.
 
     Returns
     -------
@@ -71,15 +71,15 @@ def margin(
     PlanError
         The plan is not verified.
     ProblemError
-        An argument does not fit the plan; there is neither a body to meet nor a tolerance; or the
-        tolerance is asked for where the orientation is relaxed.
+        An argument does not fit the plan; there is neither a clearance nor a tolerance; or a
+        tolerance is given where the orientation is relaxed.
 
     Notes
     -----
-    With a lever ρ, the distance of what may touch from the centre, a displacement takes
-    |d| + ρ θ off a distance at most; planes between the bodies make that sharp (see
-    `collision.displaced`). Pairs of bodies that the certificate does not look at, such as the part
-    and the immovable base, are not judged here either.
+    A displacement lowers a distance by at most |d| + ρ θ, with the lever arm ρ of the body about
+    the centre; separating planes give a sharp bound (see `collision.displaced`). Pairs of bodies
+    that the certificate does not check, such as the part and the fixed base, are not judged here
+    either.
     """
     if not isinstance(plan, Plan):
         raise ProblemError(f"margin: plan is {shown(plan)}, expected a Plan")
@@ -97,8 +97,8 @@ def margin(
         _margin_of(plan, models, item, allowed, left)
         for item in (part_of(plan, part, middle), tool_of(plan, tool), base_of(plan))
     )
-    judged, made_of = _judged(plan, allowed, left), (plan.trajectory.digest, plan.problem.digest)
-    return Margins(plan.robot.name, of_part, of_tool, of_base, judged, *made_of)
+    judged, digests = _judged(plan, allowed, left), (plan.trajectory.digest, plan.problem.digest)
+    return Margins(plan.robot.name, of_part, of_tool, of_base, judged, *digests)
 
 
 def _checked(plan: Plan, tolerance: Tolerance | None) -> Tolerance | None:
@@ -116,16 +116,16 @@ def _checked(plan: Plan, tolerance: Tolerance | None) -> Tolerance | None:
 
 def _judged(plan: Plan, tolerance: Tolerance | None, left: float) -> str:
     bodies = [what for what in plan.certificate.covers if what in ("self-collision", "obstacles")]
-    apart = f" ({left * 1e3:.3g} mm are left)" if left else " (bodies do not meet)"
-    told = [" and ".join(bodies) + apart] if bodies else []
+    distance = f" ({left * 1e3:.3g} mm are left)" if left else " (bodies do not meet)"
+    judged = [" and ".join(bodies) + distance] if bodies else []
     if tolerance is None:
-        told.append("not the tool's distance from its path, for which no tolerance is given")
+        judged.append("not the tool's distance from its path, for which no tolerance is given")
     else:
-        told.append(
+        judged.append(
             f"the tool within {tolerance.position * 1e3:.3g} mm and "
             f"{np.degrees(tolerance.rotation):.3g}° of its path"
         )
-    return "; ".join(told)
+    return "; ".join(judged)
 
 
 def _margin_of(
@@ -146,7 +146,7 @@ def _margin_of(
             if found.pair:
                 stop = found, _met(found, left)
             elif found.scale < stop[0].scale:
-                # Nothing is met, but less is proved.
+                # No collision was found, but less is proved.
                 stop = Least(found.scale, time=stop[0].time), stop[1]
         return _displacement(subject, size, *stop)
 

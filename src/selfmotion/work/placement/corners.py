@@ -1,7 +1,7 @@
-"""How far the part, or the arm, may stand elsewhere when the motion is planned again for that.
+"""How far a part or base may be displaced if the motion is planned again for its new place.
 
-An estimate from the room that the joints have, and what is confirmed: motions planned again at
-places all around, each from the one that there is.
+An estimate from the distance of the joints to their limits, and a confirmed size: motions are
+planned again for displacements in all directions, each with the present plan as warm start.
 """
 
 from __future__ import annotations
@@ -30,37 +30,37 @@ from selfmotion.planning.result import Plan
 from selfmotion.problem.constraints import Clearance
 from selfmotion.work.placement.places import COORDINATES, Places, Tried, places_of
 
-# A motion is near another one while no joint is farther from it than this [rad or m].
+# Two motions are near each other while no joint differs by more than this [rad or m].
 NEAR = 0.5
-# Times at which the room of the joints is looked at.
-_LOOKS = 60
-# Directions all around: the axes, and the diagonals of their octants.
-_AROUND = np.vstack(
+# Times at which motions are compared, and joint limits evaluated.
+_SAMPLES = 60
+# Directions: the axes, and the diagonals of their octants.
+_DIRECTIONS = np.vstack(
     [np.eye(3), -np.eye(3), np.array(list(product((1.0, -1.0), repeat=3))) / 3**0.5]
 )
-# The largest ball within the hull of these, of length 1: a face of it is spanned by an axis and two
-# diagonals beside it, all at this distance from its plane's normal (1, √3 - 1, 0).
-_WITHIN = 1.0 / math.hypot(1.0, math.sqrt(3.0) - 1.0)
-# Growth of a size that is confirmed in all directions.
+# Radius of the largest ball within the hull of these unit vectors. A face of the hull is spanned by
+# an axis and the two diagonals beside it; its normal is (1, √3 - 1, 0).
+_INSCRIBED = 1.0 / math.hypot(1.0, math.sqrt(3.0) - 1.0)
+# Factor to the next size after one that is confirmed in all directions.
 _GROWTH = 1.6
 # Bisections between the largest confirmed size and the smallest refused one.
 _HALVINGS = 5
-# Sizes below this share of the largest one that is looked at are none.
+# Sizes below this share of the largest one count as none.
 _LEAST = 1e-3
 
 
 @dataclass(frozen=True)
 class Corner:
-    """A place at which a motion was planned again, and what came of it.
+    """A displacement for which a motion was planned again, with the result.
 
     Attributes
     ----------
     name : str
         Such as "+x", "-yaw", or "+x-y+z" for the diagonal of an octant.
     size : float
-        How far it is moved or turned [m or rad].
+        Length or angle of the displacement [m or rad].
     reason : str
-        Why it is not verified, or not near; "" where it is both.
+        Why the motion is not verified, or not near the plan; "" where it is both.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Corner:
 
 @dataclass(frozen=True)
 class CorrectionSide:
-    """How far something may be moved, or turned.
+    """How far something may be moved, or turned, if it is planned again.
 
     Attributes
     ----------
@@ -80,10 +80,9 @@ class CorrectionSide:
     corners : tuple of Corner
         Where motions were verified, in 14 directions; empty where none was confirmed.
     estimate : float
-        What the room of the joints at the planned motion gives, to first order [m or rad].
+        By the distance of the joints to their limits, to first order [m or rad].
     stops : str
-        What is in the way at the next larger size that was tried; "" where nothing is as far as
-        was looked.
+        What fails at the next larger size that was tried; "" where nothing fails in the range.
     """
 
     size: float
@@ -94,7 +93,7 @@ class CorrectionSide:
 
 @dataclass(frozen=True)
 class Correction:
-    """How far part or base may stand elsewhere when it is planned again.
+    """How far a part or base may be displaced if the motion is planned again.
 
     Attributes
     ----------
@@ -111,19 +110,19 @@ class Correction:
     problem: str
 
     def __str__(self) -> str:
-        """Return both in words: what is confirmed, where, and what stops more."""
+        """Return both sides in words: what is confirmed, in how many directions, what limits it."""
         sides = (("moved", self.translation), ("turned", self.rotation))
         count = sum(len(side.corners) for _, side in sides)
         lines = [f"planned again, the {self.of} may be (confirmed at {count} corners)"]
         for what, side in sides:
-            told = "nowhere"
+            where = "nowhere"
             if side.corners:
-                farthest = _told(what, side.corners[0].size)
-                told = f"in {len(side.corners)} directions by {farthest}"
+                farthest = _size_text(what, side.corners[0].size)
+                where = f"in {len(side.corners)} directions by {farthest}"
             stops = side.stops or "nothing in the range that was searched"
             lines.append(
-                f"{what} by {_told(what, side.size)}: verified {told}; estimate "
-                f"{_told(what, side.estimate)}; stops: {stops}"
+                f"{what} by {_size_text(what, side.size)}: verified {where}; estimate "
+                f"{_size_text(what, side.estimate)}; stops: {stops}"
             )
         return "\n".join(lines)
 
@@ -138,25 +137,25 @@ def correction(
     most_turned: float = 0.3,
     progress: Progress = silent,
 ) -> Correction:
-    """Return how far part or base may stand elsewhere when the motion is planned again for that.
+    """Return how far a part or base may be displaced if the motion is planned again for that.
 
-    What is claimed was planned again: in 14 directions, along all axes and into all octants, a
-    verified motion was found no joint of which is farther than 0.5 rad or m from the plan's. The
-    size is that of the largest ball within these corners: 0.807 of their distance. Between corners
-    nothing is proved; `make bench NAME=corrections` plans again there.
+    A size is confirmed by planning: in 14 directions, along all axes and into all octants, a
+    verified motion was found none of whose joints differs by more than 0.5 rad or m from the plan.
+    The size is the radius of the largest ball within these corners, 0.807 of their distance.
+    Between corners nothing is proved; `make bench NAME=corrections` plans again there.
 
     Parameters
     ----------
     plan : Plan
         A verified one.
     of : {"part", "base"}
-        What stands elsewhere.
+        What is displaced.
     part : sequence of str, optional
-        The obstacles that move along with the path; by default all that stand in the world.
+        The obstacles that move with the path; by default all that are fixed in the world.
     center : (3,), optional
-        What it is turned about, in world axes [m]; by default the middle of the path, or the base.
+        Centre of rotations, in world axes [m]; by default the middle of the path, or the base.
     farthest, most_turned : float
-        No corners farther away are looked at [m], [rad].
+        Largest displacements that are tried [m], [rad].
     progress : callable, optional
         Called with ``("corners", done, 0)``.
 
@@ -177,7 +176,7 @@ def correction(
     about = None if center is None else as_numbers(center, "correction: center", "(3,)", (3,))
     bodies = part
     if of == "part" and part is None:
-        bodies = _standing(plan)
+        bodies = _fixed_obstacles(plan)
     places = places_of([plan.problem], of, bodies, about, COORDINATES)
     limits = (
         as_number(farthest, "correction: farthest", above=0.0),
@@ -189,7 +188,7 @@ def correction(
     return Correction(of, translation, rotation, plan.trajectory.digest, plan.problem.digest)
 
 
-def _standing(plan: Plan) -> tuple[str, ...]:
+def _fixed_obstacles(plan: Plan) -> tuple[str, ...]:
     items = (*plan.problem.constraints, plan.problem.clearance)
     return tuple(
         body.name
@@ -208,70 +207,71 @@ class _Corners:
 
     def side(self, axes: range, most: float) -> CorrectionSide:
         """Return the largest size that is confirmed at the corners around."""
-        ways = [np.eye(6)[:, list(axes)] @ way for way in _AROUND]
-        names = [_named([COORDINATES[k] for k in axes], way) for way in _AROUND]
-        estimate = min(_room(self._places, self._plan, way) for way in ways)
+        directions = [np.eye(6)[:, list(axes)] @ each for each in _DIRECTIONS]
+        names = [_name_of([COORDINATES[k] for k in axes], each) for each in _DIRECTIONS]
+        estimate = min(_room(self._places, self._plan, each) for each in directions)
         size = min(max(estimate, _LEAST * most), most)
         low, high, stops = 0.0, math.inf, ""
         confirmed: tuple[Corner, ...] = ()
         what = "moved" if axes.start == 0 else "turned"
         for _ in range(_HALVINGS + 12):
-            tried = self._at(ways, names, size)
+            tried = self._at(directions, names, size)
             worst = tried[-1]
             if worst.reason:
-                high, stops = size, f"{worst.name} by {_told(what, size)}: {worst.reason}"
+                high, stops = size, f"{worst.name} by {_size_text(what, size)}: {worst.reason}"
                 # The corner that failed last is tried first: usually it fails again.
                 first = names.index(worst.name)
                 names.insert(0, names.pop(first))
-                ways.insert(0, ways.pop(first))
+                directions.insert(0, directions.pop(first))
             else:
                 low, confirmed = size, tuple(tried)
             if low >= most or high <= _LEAST * most or high - low <= high / 2**_HALVINGS:
                 break
             size = min(_GROWTH * low, most) if math.isinf(high) else 0.5 * (low + high)
-        return CorrectionSide(_WITHIN * low, confirmed, estimate, stops)
+        return CorrectionSide(_INSCRIBED * low, confirmed, estimate, stops)
 
-    def _at(self, ways: Sequence[Array], names: Sequence[str], size: float) -> list[Corner]:
+    def _at(self, directions: Sequence[Array], names: Sequence[str], size: float) -> list[Corner]:
         """Plan at corners of a size, until one fails."""
         found = []
-        for way, name in zip(ways, names, strict=True):
-            tried = self._places.corrected(size * way, (self._plan,))
+        for direction, name in zip(directions, names, strict=True):
+            tried = self._places.corrected(size * direction, (self._plan,))
             self._done += 1
             self._progress("corners", self._done, 0)
-            found.append(Corner(name, size, tried.reason or _far(self._plan, tried)))
+            found.append(Corner(name, size, tried.reason or _difference(self._plan, tried)))
             if found[-1].reason:
                 break
         return found
 
 
-def _named(axes: Sequence[str], way: Array) -> str:
+def _name_of(axes: Sequence[str], direction: Array) -> str:
     """Return a direction (3,) in words."""
     return "".join(
         f"{'+' if share > 0.0 else '-'}{axis}"
-        for axis, share in zip(axes, way.tolist(), strict=True)
+        for axis, share in zip(axes, direction.tolist(), strict=True)
         if share
     )
 
 
-def _far(plan: Plan, tried: Tried) -> str:
-    """Return which joint is farther from a plan than what counts as near; "" for none."""
-    t = np.linspace(plan.trajectory.t[0], plan.trajectory.t[-1], _LOOKS)
-    apart = np.abs(tried.plans[0].trajectory(t) - plan.trajectory(t))
-    row, joint = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    if apart[row, joint] <= NEAR:
+def _difference(plan: Plan, tried: Tried) -> str:
+    """Return which joint differs from a plan by more than `NEAR`, in words; "" for none."""
+    t = np.linspace(plan.trajectory.t[0], plan.trajectory.t[-1], _SAMPLES)
+    difference = np.abs(tried.plans[0].trajectory(t) - plan.trajectory(t))
+    row, joint = np.unravel_index(int(np.argmax(difference)), difference.shape)
+    largest = difference[row, joint]
+    if largest <= NEAR:
         return ""
     name = plan.robot.joint_names[int(joint)]
-    return f"joint '{name}' is {apart[row, joint]:.2g} {plan.robot.unit_of(name)} from the plan"
+    return f"joint '{name}' is {largest:.2g} {plan.robot.unit_of(name)} from the plan"
 
 
-def _room(places: Places, plan: Plan, way: Array) -> float:
-    """Return how far the joints' limits let the target go along a way, to first order.
+def _room(places: Places, plan: Plan, direction: Array) -> float:
+    """Return how far joint limits allow a displacement in a direction (6,), to first order.
 
     For a target moved by δx, Δq = J⁺ δx is the least change of the joints.
     """
-    follows, t = plan.problem.follows, spread_along(plan.path, _LOOKS)
+    follows, t = plan.problem.follows, spread_along(plan.path, _SAMPLES)
     small = 1e-6
-    by = places.displacement(small * way)
+    by = places.displacement(small * direction)
     if places.of == "base":
         by = by.inverse()
     frame = follows.items[0].chain.base_placement
@@ -291,7 +291,7 @@ def _room(places: Places, plan: Plan, way: Array) -> float:
     return max(room, 0.0)
 
 
-def _told(what: str, size: float) -> str:
+def _size_text(what: str, size: float) -> str:
     if math.isinf(size):
         return "any"
     return f"{1e3 * size:.3g} mm" if what == "moved" else f"{math.degrees(size):.3g}°"

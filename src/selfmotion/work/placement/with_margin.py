@@ -1,8 +1,8 @@
-"""Motions that leave room for what may stand elsewhere, and what that room costs.
+"""Motions with a margin for displacements of part, tool or base, and the cost of the margin.
 
-What would be met first by a part, tool or base that is displaced is kept farther apart, by as much
-as it lacks; then the motion is planned again, and judged as any other (`margins`). So no pair is
-kept farther apart than it has to be.
+The clearance of the pair of bodies that would collide first is raised by the missing distance. Then
+the motion is planned again, and its margin computed (`margins`). So no pair has more clearance than
+it needs.
 """
 
 from __future__ import annotations
@@ -36,32 +36,32 @@ from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
 _ROUNDS = 12
 # Clearance beyond the missing margin [m].
 _MORE = 2e-5
-# Share of a margin that its proof may lose.
+# Share of a margin that its proof may fall short of it.
 _SHARE = 0.02
 # Excess over the required margin that ends the rounds, as a share.
 _ENOUGH = 0.01
 _SUBJECTS = ("part", "tool", "base")
-# Why there is no more of it, after Ctrl-C.
+# Why the search ended, after Ctrl-C.
 _INTERRUPTED = "it was interrupted"
 
 
 @dataclass(frozen=True, eq=False)
 class PlanWithMargin:
-    """A motion that leaves a margin, and what it costs.
+    """A motion with a margin, and the cost of the margin.
 
     Attributes
     ----------
     plan : Plan
-        Of the problem that was asked, with its own certificate.
+        Of the given problem, with its own certificate.
     wanted : Margin
     of : tuple of str
-        What may be displaced by that much.
+        What may be displaced.
     shortfalls : tuple of Shortfall
-        What is left to be wished; empty where the margin is there, proved.
+        Where the margin is not reached; empty where it is proved.
     cost, cost_without : float
         Of this plan, and of the best one that was found without a margin.
     kept_apart : dict
-        Pair of bodies → distance that they were kept apart by for this plan [m].
+        Pair of bodies → the clearance that it was planned with [m].
     refused : str
         The reason why the margin is not reached; "" if it is.
     """
@@ -77,7 +77,7 @@ class PlanWithMargin:
 
     @property
     def reached(self) -> bool:
-        """Whether the margin is there, in a verified motion."""
+        """Whether the margin is proved, of a verified motion."""
         return self.plan.certificate.verified and not self.shortfalls
 
     @property
@@ -86,7 +86,7 @@ class PlanWithMargin:
         return self.cost / self.cost_without - 1.0 if self.cost_without else 0.0
 
     def __str__(self) -> str:
-        """Return whether the margin is there, and what it costs, in words."""
+        """Return whether the margin is reached, and its cost, in words."""
         wanted = (
             f"{self.wanted.position * 1e3:.3g} mm and {np.degrees(self.wanted.rotation):.3g}° of "
             f"{', '.join(self.of)}"
@@ -115,14 +115,14 @@ def plan_with_margin(
     progress: Progress = silent,
     **options: Any,
 ) -> PlanWithMargin:
-    """Plan a motion that survives displacements of a size, and say what that costs.
+    """Plan a motion that stays valid for displacements up to a size; return it with its cost.
 
-    Bands of tolerances (`Relaxation`) are planned with as much less as the displacement may use.
+    Bands of tolerances (`Relaxation`) are narrowed by what the displacement may use of them.
 
     Parameters
     ----------
     problem : Problem
-        One that keeps bodies apart.
+        With a clearance.
     margin : Margin
         All displacements up to both of its sizes at once.
     of : str or sequence of str
@@ -130,9 +130,9 @@ def plan_with_margin(
     part, tool, center, clearance
         As `selfmotion.margin` takes them.
     progress : callable, optional
-        Told the round, as plans tell their stages.
+        Called with ``("margin", round, rounds)``.
     **options
-        For `plan`: search, tolerance, deadline, each time.
+        Of `plan`, for each round: search, tolerance, deadline.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def plan_with_margin(
     PlanError
         There is no verified motion without a margin.
     ProblemError
-        An argument is not what it should be; or a band is narrower than what is asked.
+        An argument is not what it should be; or a band is narrower than the margin.
     KeyboardInterrupt
         It was interrupted before there was a motion.
     """
@@ -164,29 +164,29 @@ def plan_with_margin(
     options.pop("warm_start", None)
     search = _MarginSearch(problem, first, partial(shortfalls, wanted=margin, of=named, **given))
     search.run(margin, clearance, options, progress)
-    told = search.best or search.now
+    result = search.best or search.now
     return PlanWithMargin(
-        told.plan,
+        result.plan,
         margin,
         named,
-        told.found.items,
-        told.plan.report.cost,
+        result.found.items,
+        result.plan.report.cost,
         search.without,
-        told.apart,
+        result.clearances,
         "" if search.best else search.refused,
     )
 
 
-class _Made(NamedTuple):
-    """A plan, what it lacks, and how far which pairs were kept apart for it [m]."""
+class _Trial(NamedTuple):
+    """A plan, its shortfalls, and the clearances of pairs that it was planned with [m]."""
 
     plan: Plan
     found: Shortfalls
-    apart: dict[tuple[str, str], float]
+    clearances: dict[tuple[str, str], float]
 
 
 class _MarginSearch:
-    """Rounds in which pairs of bodies are kept farther apart, until a margin is there.
+    """Rounds with larger clearances of pairs of bodies, until the margin is reached.
 
     Parameters
     ----------
@@ -194,24 +194,24 @@ class _MarginSearch:
     first : Plan
         Verified, without a margin.
     lacks : callable
-        Plan → what it lacks of the margin.
+        Plan → its shortfalls.
 
     Attributes
     ----------
-    now : _Made
+    now : _Trial
         The last plan.
-    best : _Made or None
+    best : _Trial or None
         The cheapest one with the margin.
     without : float
-        Least cost that is known of a motion without a margin.
+        Lowest cost of a verified motion without the margin.
     refused : str
-        Why no round came after the last one.
+        Why the rounds ended without the margin.
     """
 
     def __init__(self, problem: Problem, first: Plan, lacks: Callable[[Plan], Shortfalls]) -> None:
         self._problem, self._first, self._lacks = problem, first, lacks
-        self.now = _Made(first, lacks(first), {})
-        self.best: _Made | None = None
+        self.now = _Trial(first, lacks(first), {})
+        self.best: _Trial | None = None
         self.without, self.refused = first.report.cost, ""
 
     def run(
@@ -228,38 +228,39 @@ class _MarginSearch:
             return
         for number in range(_ROUNDS):
             progress("margin", number + 1, _ROUNDS)
-            apart = _adjusted(self.now.apart, self.now.found, clearance)
-            raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
+            clearances = _adjusted(self.now.clearances, self.now.found, clearance)
+            pairs = _of_pairs(problem, clearances)
+            raised = narrow.changed(constraints=(*narrow.constraints, *pairs))
             again = plan(raised, warm_start=self.now.plan, **options)
             if not number and not _is_interrupted(again):
-                # Past bodies there are several ways, and the one of before may have become longer.
+                # Past bodies there are several routes; another one may be shorter now.
                 again = min(again, plan(raised, **options), key=_rank)
-            if self._is_done(again, apart):
+            if self._is_done(again, clearances):
                 break
 
-    def _is_done(self, again: Plan, apart: dict[tuple[str, str], float]) -> bool:
-        """Take a round's plan; return whether it was the last one."""
+    def _is_done(self, again: Plan, clearances: dict[tuple[str, str], float]) -> bool:
+        """Judge the plan of a round; return whether it was the last one."""
         certificate = self._problem.certify(again.trajectory, self._first.tolerance)
         plan_now = replace(again, problem=self._problem, certificate=certificate)
         if certificate.verified:
-            # A motion that keeps pairs farther apart is one without a margin, too.
+            # Motions with larger clearances are valid without a margin, too.
             self.without = min(self.without, again.report.cost)
         if not again.certificate.verified:
             self.refused = again.certificate.verdict.removeprefix("not verified: ")
-            # The attempt may be nearer to it all the same.
+            # It may still have smaller shortfalls.
             if certificate.verified:
                 more = self._lacks(plan_now)
                 if more.least > self.now.found.least:
-                    self.now = _Made(plan_now, more, apart)
+                    self.now = _Trial(plan_now, more, clearances)
             return True
-        now = self.now = _Made(plan_now, self._lacks(plan_now), apart)
+        now = self.now = _Trial(plan_now, self._lacks(plan_now), clearances)
         has_it = not now.found.items
         if has_it and (self.best is None or again.report.cost < self.best.plan.report.cost):
             self.best = now
         if _is_interrupted(again):
             self.refused = _INTERRUPTED
             return True
-        return has_it and (not apart or now.found.least <= 1.0 + _ENOUGH)
+        return has_it and (not clearances or now.found.least <= 1.0 + _ENOUGH)
 
 
 def _is_interrupted(found: Plan) -> bool:
@@ -271,25 +272,25 @@ def _rank(found: Plan) -> tuple[bool, float]:
 
 
 def _adjusted(
-    apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float
+    clearances: dict[tuple[str, str], float], found: Shortfalls, clearance: float
 ) -> dict[tuple[str, str], float]:
-    """Keep pairs farther apart if a margin is missing, and less far if it is larger than needed.
+    """Return larger clearances where the margin is missing, smaller ones where it is exceeded.
 
-    To first order a displacement that is a share larger uses that share more of the distance.
+    To first order the distance that a displacement uses is proportional to its size.
     """
     spare = max(found.least - 1.0, 0.0)
-    kept = {pair: far - spare * (far - clearance) for pair, far in apart.items()}
+    adjusted = {pair: far - spare * (far - clearance) for pair, far in clearances.items()}
     for item in found.items:
         pair = (min(item.pair), max(item.pair))
-        if pair in kept:
-            kept[pair] += (1.0 - item.scale) * item.used + _MORE
+        if pair in adjusted:
+            adjusted[pair] += (1.0 - item.scale) * item.used + _MORE
         else:
-            kept[pair] = clearance + (1.0 + _SHARE) * item.used
-    return kept
+            adjusted[pair] = clearance + (1.0 + _SHARE) * item.used
+    return adjusted
 
 
 def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
-    """Return tolerances of which a displacement may use its part."""
+    """Return tolerances without what the displacement may use of them."""
     found = []
     for item in problem.relaxations:
         turns = item.rows[0].startswith("r")
@@ -303,7 +304,7 @@ def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]
     return tuple(found)
 
 
-def _kept(problem: Problem, apart: dict[tuple[str, str], float]) -> list[Clearance]:
+def _of_pairs(problem: Problem, clearances: dict[tuple[str, str], float]) -> list[Clearance]:
     """Return clearances of single pairs of bodies."""
     found = []
     bodies = {
@@ -312,7 +313,7 @@ def _kept(problem: Problem, apart: dict[tuple[str, str], float]) -> list[Clearan
         if isinstance(item, Clearance)
         for body in item.obstacles
     }
-    for pair, distance in apart.items():
+    for pair, distance in clearances.items():
         own = tuple(bodies[name] for name in pair if name in bodies)
         every = dict.fromkeys(CollisionModel(problem.robot, own).pairs)
         others = tuple(names for names in every if set(names) != set(pair))
