@@ -1,12 +1,14 @@
 """Jobs, plans and programs on the page: what is planned, what is saved, what is only shown."""
 
+import contextlib
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import PlanError, ProblemError
+from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.model.task import SE3
 from selfmotion.shell.view import Sitting, opened as open_page
 from selfmotion.shell.view.document import is_job
@@ -158,3 +160,29 @@ def test_a_plan_is_shown_as_it_is_changed_and_saved_with_its_problem(plan, tmp_p
         session.answer({"do": "undo"})
         planned(page)
         np.testing.assert_array_equal(session.found.plan.trajectory.q, plan.trajectory.q)
+
+
+def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
+    """Its numbers stand beside the own ones, its arm is the ghost; what is no plan is refused."""
+    file = tmp_path / "circle.npz"
+    plan.save(file)
+    data = file.read_bytes()
+    sitting = open_page(file)
+    with contextlib.closing(sitting):
+        shown = Heard(sitting)
+        other = sm.plan(replace(plan.problem, costs=(sm.costs.InverseManipulability(1.0),)))
+        other.save(tmp_path / "other.npz")
+        sitting.show_beside("other.npz", (tmp_path / "other.npz").read_bytes())
+        found = shown.messages[-1]
+        assert found["beside"] == "other.npz"
+        costs = next(row["cells"] for row in found["table"] if row["label"] == "cost")
+        own, beside = (float(value) for value, _ in costs)
+        assert own == pytest.approx(plan.report.cost, rel=1e-5)
+        assert beside == pytest.approx(other.evaluate(*plan.problem.costs), rel=1e-5)
+        assert beside > own
+        with pytest.raises(FileFormatError, match=r"^broken\.npz"):
+            sitting.show_beside("broken.npz", b"no plan")
+        sitting.show_beside("", b"")
+        assert shown.messages[-1]["beside"] == ""
+    with pytest.raises(ProblemError, match="here are several seams"):
+        page.session.show_beside("circle.npz", data)

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from selfmotion.basics import PlanError, ProblemError
-from selfmotion.planning.result import Parts
+from selfmotion.basics import FileFormatError, PlanError, ProblemError
+from selfmotion.planning.result import Parts, Plan, load_plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
 from selfmotion.shell.view.found import Found
@@ -44,6 +44,7 @@ class Sitting:
     def __init__(self, file: Path, why: str = "") -> None:
         self.file, self._why = file, why
         self._found: Found | None = None
+        self._beside: tuple[str, Plan] | None = None
         self._html, self._shown = "", Shown()
         self._send: Callable[[bytes], None] | None = None
         self._lock, self._telling = threading.RLock(), threading.Lock()
@@ -121,12 +122,48 @@ class Sitting:
         # One after the other, so that an older message never comes last.
         with self._telling:
             with self._lock:
-                found, send = self._found, self._send
+                found, send, beside = self._found, self._send, self._beside
                 if found is None or send is None:
                     return
                 state = {**self._state(), "answers": self._answered(found)}
             # The page may go on to ask while this is made.
-            send(self._shown.message(found, state))
+            send(self._shown.message(found, state, beside))
+
+    def show_beside(self, name: str, data: bytes) -> None:
+        """Show the plan of a file beside the own one; none where there are no `data`.
+
+        Raises
+        ------
+        FileFormatError
+            It is no plan.
+        ProblemError
+            It is of another arm, or here are several seams.
+        """
+        beside = None
+        if data:
+            with TemporaryDirectory(prefix="selfmotion-") as folder:
+                file = Path(folder) / "beside.npz"
+                file.write_bytes(data)
+                try:
+                    beside = name, load_plan(file)
+                except FileFormatError as error:
+                    text = str(error).replace(str(file), name)
+                    raise FileFormatError(text) from error
+            self._check_beside(*beside)
+        with self._lock:
+            self._beside = beside
+        self.tell()
+
+    def _check_beside(self, name: str, plan: Plan) -> None:
+        found = self._found
+        if found is None or found.plan is None or found.whole is not None:
+            raise ProblemError(f"{name}: a plan is shown beside a plan, and here are several seams")
+        own = found.plan.robot
+        if plan.robot.joint_names != own.joint_names or plan.robot.name != own.name:
+            raise ProblemError(
+                f"{name}: is of '{plan.robot.name}', expected a plan of '{own.name}' with the same "
+                f"joints"
+            )
 
     def _state(self) -> Json:
         return {"sliders": [], "changed": False, "undo": False}

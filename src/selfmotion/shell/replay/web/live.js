@@ -4,6 +4,8 @@ const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to a joint 
 // How the server ends a connection: without the token, and where another tab has the page.
 const REFUSED = 4403;
 const TAKEN = 4409;
+// The node of the places in reach.
+const FLOOR = "/selfmotion/floor";
 // A slider has so many steps.
 const STEPS = 400;
 
@@ -29,6 +31,8 @@ class Live {
     get("undo").addEventListener("click", () => this.ask({ do: "undo" }));
     get("save").addEventListener("click", () => this.ask({ do: "save" }));
     get("export").addEventListener("change", () => this.export());
+    get("second").addEventListener("click", () => (this.beside ? this.compare() : get("secondfile").click()));
+    get("secondfile").addEventListener("change", ({ target }) => { if (target.files.length) this.compare(target.files[0]); });
     get("turns").addEventListener("click", () => this.handles?.setTurns(!this.handles.turns) ?? this.drawTurns());
     get("letgo").addEventListener("click", () => this.handles?.choose(undefined));
     window.addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
@@ -104,11 +108,14 @@ class Live {
     this.state(message);
     if (plans) {
       this.handles?.settle();
+      page.content.columns = message.beside ? ["this one", message.beside] : undefined;
+      this.drawBeside(message.beside);
       page.replace(message);
       this.handles?.update(handles);
       this.drawHandles(handles);
       if (coarse) this.handles?.carry();
     }
+    this.drawFloor(this.handles?.gripped ? message.floor : undefined);
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
     if (brief) get("maps").classList.add("stale");
@@ -130,14 +137,38 @@ class Live {
       : message.kind === "early" ? "early" : "verified";
   }
 
+  // Where else what is dragged could stand: green on the ground.
+  drawFloor(floor) {
+    const { stage, content } = this.page;
+    stage?.viewer.remove(FLOOR);
+    get("green").hidden = !floor;
+    if (!stage || !floor) return;
+    const { places, size } = floor, high = content.ground + 0.002 * content.radius;
+    const vertices = [], triangles = [];
+    for (let k = 0; k < places.length; k += 2) {
+      for (const [x, y] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+        vertices.push(places[k] + 0.46 * x * size, places[k + 1] + 0.46 * y * size, high);
+      }
+      triangles.push(...[0, 1, 2, 0, 2, 3].map((corner) => 2 * k + corner));
+    }
+    const squares = new THREE.Mesh(
+      surface({ vertices: new Float32Array(vertices), triangles: new Uint32Array(triangles) }),
+      new THREE.MeshBasicMaterial({ color: 0x2ea043, transparent: true, opacity: 0.35, depthWrite: false }));
+    stage.find(FLOOR).add(squares);
+    stage.viewer.draw();
+  }
+
   drawNumbers(table) {
     if (!table) return;
     const rows = table.filter(({ label }) => TOLD.includes(label) || label.startsWith("closest to"));
     get("figures").replaceChildren();
-    for (const { label, cells: [[value, note]] } of rows) {
+    const columns = this.page.content.columns ?? [""];
+    get("figures").style.gridTemplateColumns = `auto${" auto".repeat(columns.length)}`;
+    if (columns.length > 1) for (const name of ["", ...columns]) element(get("figures"), "dt", {}, name);
+    for (const { label, cells } of rows) {
       element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
       // Where and when is in the table below: here the numbers leave room for the map.
-      element(get("figures"), "dd", note ? { title: note } : {}, value);
+      for (const [value, note] of cells) element(get("figures"), "dd", note ? { title: note } : {}, value);
     }
   }
 
@@ -202,6 +233,26 @@ class Live {
       input.addEventListener("change", () => slide(true));
       this.sliders.set(slider.name, { slider, input, output });
     }
+  }
+
+  // Show the plan of a file beside the own one; without a file none.
+  async compare(file) {
+    const address = `/beside?name=${encodeURIComponent(file?.name ?? "")}&token=${encodeURIComponent(this.token)}`;
+    const answer = await fetch(address, { method: "POST", body: file ?? "" });
+    get("secondfile").value = "";
+    this.say(answer.ok ? "" : await answer.text(), !answer.ok);
+  }
+
+  // Another plan takes the place of the minimum-norm motion as the ghost of this one.
+  drawBeside(beside) {
+    const { page } = this;
+    if (beside === (this.beside ?? "")) return;
+    this.beside = beside;
+    get("second").textContent = beside ? `Without ${beside}` : "Compare …";
+    const box = get("layer-ghost");
+    if (!box) return;
+    box.nextSibling.textContent = beside || page.content.layers.find(({ name }) => name === "ghost").label;
+    page.setLayer("ghost", beside !== "");
   }
 
   async export() {
