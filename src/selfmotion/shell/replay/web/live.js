@@ -24,6 +24,8 @@ class Live {
     get("save").title = `Writes ${saves}`;
     for (const [value, name] of exports) element(get("export"), "option", { value }, name);
     if (!saves) this.say(why);
+    get("export").parentElement.hidden = exports.length === 0;
+    get("second").hidden = page.content.plans[0].steps.length > 0;
     if (page.stage) {
       this.handles = new Handles(page.stage, page.content.radius,
         (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
