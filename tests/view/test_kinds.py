@@ -1,6 +1,7 @@
 """Jobs, plans and programs on the page: what is planned, what is saved, what is only shown."""
 
 import contextlib
+import re
 import tomllib
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from selfmotion.model.task import SE3
 from selfmotion.shell.view import Sitting, opened as open_page
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.handles import dragged, handles_of
+from support.industrial import two_seams
 from support.views import CIRCLE, Heard, moved, opened
 
 # Two seams beside each other; without a clearance, so that they are planned soon.
@@ -121,6 +123,37 @@ def test_a_program_is_shown_as_it_is(page, tmp_path):
     with pytest.raises(ProblemError, match="`selfmotion view` changes its job file"):
         sitting.answer({"do": "undo"})
     assert sitting.export(".csv") == page.session.export(".csv")
+
+
+def test_a_controllers_program_is_judged_by_its_job(tmp_path):
+    """As `selfmotion check` does: what is wrong with it is said, and its seam is red."""
+    program = two_seams()
+    job, file = tmp_path / "job.program", tmp_path / "job.src"
+    program.save(job)
+    signals = {"arc on": (1, True), "arc off": (1, False)}
+    # The page writes it as its settings say.
+    sitting = open_page(job)
+    with pytest.raises(ProblemError, match="has no signal"):
+        sitting.export(".src")
+    sitting.settings = sm.files.ProgramSettings(signals=signals)
+    file.write_bytes(sitting.export(".src"))
+    shown = Heard(open_page(file, job=job)).messages[-1]
+    assert shown["plans"][0]["verified"]
+    names = [step["name"] for step in shown["plans"][0]["steps"]]
+    assert names == [step.name for step in program.steps]
+    broken = tmp_path / "broken.src"
+    # One target in the middle is taught elsewhere.
+    targets = list(re.finditer(r"A1 (-?[\d.]+)", file.read_text()))
+    first, last = targets[len(targets) // 2].span(1)
+    text = file.read_text()
+    broken.write_text(f"{text[:first]}{float(text[first:last]) + 2.0:.6f}{text[last:]}")
+    shown = Heard(open_page(broken, job=job)).messages[-1]
+    assert shown["words"].startswith("not verified: ")
+    assert not shown["plans"][0]["verified"]
+    with pytest.raises(ProblemError, match=r"give the \.program that it was made of as --robot"):
+        open_page(file)
+    with pytest.raises(ProblemError, match="has no use for --robot"):
+        open_page(job, job=job)
 
 
 def test_a_seam_without_a_part_is_dragged_itself():

@@ -12,7 +12,7 @@ from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
 from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.shown import Shown
-from selfmotion.shop.controllers import write_motion
+from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion
 
 # Files that motions are exported to, by suffix, and how the page calls them.
 _OF_MOTIONS = {
@@ -43,6 +43,8 @@ class Sitting:
 
     def __init__(self, file: Path, why: str = "") -> None:
         self.file, self._why = file, why
+        # How programs of controllers are written; None for what these settings are by default.
+        self.settings: ProgramSettings | None = None
         self._found: Found | None = None
         self._beside: tuple[str, Plan] | None = None
         self._html, self._shown = "", Shown()
@@ -87,6 +89,9 @@ class Sitting:
         found = self._found
         if found is None or found.whole is None:
             return _OF_PLANS
+        if found.made is None:
+            # A motion of a controller's own program is there already.
+            return {}
         return _OF_PARTS if isinstance(found.made, Parts) else _OF_PROGRAMS
 
     def close(self) -> None:
@@ -207,5 +212,7 @@ class Sitting:
             if suffix in _OWN:
                 made.save(file)
             else:
-                write_motion(made, file)
+                # Others have none.
+                own = self.settings if suffix in (".script", *PROGRAMS) else None
+                write_motion(made, file, settings=own)
             return file.read_bytes()

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull, QhullError
 
 from selfmotion.basics import (
     Array,
@@ -340,6 +339,9 @@ def _with_bodies(item: Clearance, names: frozenset[str], by: SE3) -> Clearance:
 
 def footprint(problems: Sequence[Problem], bodies: frozenset[str]) -> Array:
     """Return the hull from above of paths and of the bodies of these names, (P, 2) [m]."""
+    # Takes long to import, and is of the few who draw a map.
+    from scipy.spatial import ConvexHull, QhullError
+
     points = []
     for problem in problems:
         frame = problem.follows.items[0].chain.base_placement

@@ -24,6 +24,8 @@ class Live {
     get("save").title = `Writes ${saves}`;
     for (const [value, name] of exports) element(get("export"), "option", { value }, name);
     if (!saves) this.say(why);
+    get("export").parentElement.hidden = exports.length === 0;
+    get("second").hidden = page.content.plans[0].steps.length > 0;
     if (page.stage) {
       this.handles = new Handles(page.stage, page.content.radius,
         (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
@@ -210,7 +212,7 @@ class Live {
       // What was slid since then is newer than what is told.
       if (this.asked !== this.answered) continue;
       known.input.value = place(slider, slider.value);
-      known.output.textContent = number(slider.value, slider.unit);
+      if (document.activeElement !== known.typed) known.typed.value = number(slider.value);
     }
   }
 
@@ -223,15 +225,19 @@ class Live {
       element(line, "span", {}, slider.name);
       const input = element(line, "input", {
         type: "range", min: 0, max: STEPS, step: 1, "data-slider": slider.name, "aria-label": slider.name });
-      const output = element(line, "output", {});
-      const slide = (final) => {
-        const value = at(slider, Number(input.value));
-        output.textContent = number(value, slider.unit);
-        this.ask({ do: "slide", name: slider.name, value, final });
+      // A number that is known is typed.
+      const typed = element(line, "input", {
+        type: "number", step: "any", min: slider.low, max: slider.high, "data-typed": slider.name, "aria-label": `${slider.name}, as a number` });
+      element(line, "span", { class: "unit" }, slider.unit);
+      const slide = (value, final) => this.ask({ do: "slide", name: slider.name, value, final });
+      const slid = (final) => {
+        typed.value = number(at(slider, Number(input.value)));
+        slide(at(slider, Number(input.value)), final);
       };
-      input.addEventListener("input", () => slide(false));
-      input.addEventListener("change", () => slide(true));
-      this.sliders.set(slider.name, { slider, input, output });
+      input.addEventListener("input", () => slid(false));
+      input.addEventListener("change", () => slid(true));
+      typed.addEventListener("change", () => { if (typed.value !== "") slide(Number(typed.value), true); });
+      this.sliders.set(slider.name, { slider, input, typed });
     }
   }
 
@@ -284,6 +290,6 @@ function at({ low, high, even }, step) {
   return Math.min(Math.max(Number(value.toPrecision(3)), low), high);
 }
 
-function number(value, unit) {
-  return `${Number(value.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
+function number(value) {
+  return String(Number(value.toPrecision(3)));
 }
