@@ -143,14 +143,20 @@ def slides(page: Page, name: str, way: float) -> list[dict[str, Any]]:
     ]
 
 
+def written(text: str, folder: Path) -> Path:
+    """Return the file of a document, with what it names beside it."""
+    (folder / "rail.urdf").write_text(RAIL)
+    shutil.copy(FRAME.with_name("seams.csv"), folder)
+    file = folder / "problem.toml"
+    file.write_text(text)
+    return file
+
+
 def measured(text: str, repeats: int) -> tuple[Times, bool]:
     """Return the times of a document, and whether what is shown last is the plan of the file."""
     times = Times()
     with TemporaryDirectory() as folder:
-        (Path(folder) / "rail.urdf").write_text(RAIL)
-        shutil.copy(FRAME.with_name("seams.csv"), folder)
-        file = Path(folder) / "problem.toml"
-        file.write_text(text)
+        file = written(text, Path(folder))
         with (
             served(file) as server,
             connect(

@@ -21,6 +21,7 @@ BESIDE = (
     "arms.md",
     "chains.md",
     "errors.md",
+    "places.png",
     "replay.png",
     "two_motions.png",
     "view.png",
@@ -117,7 +118,8 @@ def gallery_page(ran: dict[str, shown.Shown]) -> str:
     parts = [
         "# Gallery",
         "Replays of the [examples](examples.md): each is one HTML file that plays offline. Turn "
-        "the scene by dragging.",
+        "the scene by dragging; below it is its [redundancy map](howto/redundancy.md), of a job "
+        "that of each seam.",
     ]
     for name in GALLERY:
         parts += [f"## {name.replace('_', ' ')}", ran[name].title, _replay(name)]

@@ -7,15 +7,16 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
+from selfmotion.planning.nodes import minimise
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.motion import on_grid, subdivisions
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
-from selfmotion.planning.nodes.rows import carried
+from selfmotion.planning.nodes.rows import carried, conservatism, sampled_curve
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, control_times, unit_bases
 from selfmotion.problem.constraints import said_once
 from support.arms import PANDA_HOME
 from support.circles import small_circle
-from support.nodes import along, around_of, centred, moved, nodes_of, random_step
+from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
 
 NEAR, DIFFERENCE = 1e-5, 1e-6
 
@@ -223,3 +224,47 @@ def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel)
     assert 0 < expected.sum() < len(expected)
     np.testing.assert_array_equal(used[:, 0, joint], expected)
     assert not used[:, 1, joint].any()
+
+
+@pytest.mark.parametrize("name", ["rates", "tool", "clearance"])
+def test_half_of_each_tolerance_is_in_reserve(panda: sm.RobotModel, name: str) -> None:
+    rows = motion_with(panda, name).grid.rows
+    each = [np.full(place.stop - place.start, family.item.tolerance)
+            for family, (place, _) in zip(rows.families, rows._places, strict=True)]  # fmt: skip
+    np.testing.assert_allclose(2.0 * rows.granted, np.concatenate(each))
+
+
+def test_the_curve_between_nodes_is_looked_at_when_it_is_there(panda: sm.RobotModel) -> None:
+    motion = motion_with(panda, "tool")
+    grid = motion.grid
+    curve = sampled_curve(grid.formulation, grid.spline, motion.curve_ends).arm
+    times = curve.sampling.t
+    assert len(times) > 3 * grid.spline.count
+    assert (np.diff(times) >= 0.0).all()
+    assert times[0] >= 0.0
+    assert times[-1] <= grid.t[-1]
+    for order, values in enumerate((curve.q, curve.qd, curve.qdd)):
+        expected = motion.trajectory(times, order)
+        # At a node the jerk jumps, nothing below it does.
+        np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_finer_nodes_lose_less_to_control_points(panda: sm.RobotModel) -> None:
+    """Limits of control points cost nothing where none binds, and little of fine nodes."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+
+    def optimum(limit: float, count: int) -> tuple[float, float]:
+        slow = sm.constraints.JointVelocityLimits(limit)
+        case = panda, "pose", PANDA_HOME, path
+        found = minimise(nodes_of(problem_of(case, constraints=[slow]), count), lambda step: False)
+        motion = found.motion
+        bound = conservatism(motion.grid.rows, found.multipliers, motion.curve_ends)
+        assert (bound >= 0.0).all()
+        return motion.cost, float(bound.sum())
+
+    _, nothing = optimum(10.0, 12)
+    (coarse, lost), (fine, less) = (optimum(1.25, count) for count in (12, 48))
+    assert nothing <= 1e-9 * coarse
+    assert lost > 1e-3 * coarse
+    assert less < 0.1 * lost
+    assert fine < coarse

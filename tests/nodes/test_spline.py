@@ -129,3 +129,13 @@ def test_differences_are_exact_of_polynomials_through_a_stencil(count: int) -> N
     first, second = Quintic(t).differences(x)
     np.testing.assert_allclose(first[:, 0], poly.deriv(1)(t), rtol=1e-9)
     np.testing.assert_allclose(second[:, 0], poly.deriv(2)(t), rtol=1e-9, atol=1e-9)
+
+
+def test_differences_are_the_same_backwards_in_time() -> None:
+    """Stencils are in the middle: first derivatives change their sign, second ones do not."""
+    t = np.array([0.0, 0.1, 0.4, 0.6, 0.9, 1.3, 1.4, 2.0])
+    x = np.random.default_rng(2).normal(size=(len(t), JOINTS))
+    first, second = Quintic(t).differences(x)
+    back_first, back_second = Quintic(t[-1] - t[::-1]).differences(x[::-1])
+    near(back_first[::-1], -first)
+    near(back_second[::-1], second)

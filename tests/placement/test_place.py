@@ -15,6 +15,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.shell.documents import read_problem
 from selfmotion.work.placement import search
+from selfmotion.work.placement.picture import in_unit, legend_of, picture_of
 from selfmotion.work.placement.places import Places, Tried, places_of
 from selfmotion.work.placement.search import Box, Descent, finalists
 from support.arms import robot_named
@@ -132,14 +133,17 @@ def test_a_map_is_of_plans_on_their_own(found: sm.placement.Placement, tmp_path:
         if not drawn.reasons[i][j]:
             assert drawn.costs[i, j] >= plan.report.cost * (1.0 - 1e-3)
     page = sm.files.write_placement(found, tmp_path / "map.html", drawn).read_text()
-    assert page.count("<rect") == 9
-    assert "x [m]" in page
+    # A cell for each place, with the part's outline within the frame of all.
+    assert page.count("<g><title>") == 9
+    assert "x [mm]" in page
+    assert page.count("<polygon") == page.count("<clipPath") == 1
+    assert page.count("<circle") == len(found.best())
     # Places to choose from: the cheapest first, none near another, each planned as it says.
     best = found.best()
     assert best[0].cost == pytest.approx(found.cost, rel=1e-9)
     assert best[0].cost <= best[1].cost <= best[2].cost
     assert page.count("<tr>") == 1 + len(best) == 4
-    assert f"<td>{1e3 * found.place['x']:+.1f}</td>" in page
+    assert f"<td>{in_unit('x', found.place['x'])}</td>" in page
     for item in best[1:]:
         frame = pin.SE3(np.eye(3), np.array([*item.place, 0.0]))
         plan = sm.plan(planar().changed(path=sm.paths.Placed(planar().path, frame)))
@@ -502,3 +506,41 @@ def test_a_quick_no_is_asked_again_from_the_nearest_place(monkeypatch: pytest.Mo
     refused = [item.place for item in best.tried if item.reason == "quickly"]
     assert refused
     assert {place.tobytes() for place in refused} <= {place.tobytes() for place in lent}
+
+
+def test_a_map_of_places_has_contours_and_tells_what_is_out_of_reach() -> None:
+    """A contour lies where costs are a share above the least, and ends beside what fails."""
+    across, up = np.linspace(-0.1, 0.1, 5), np.linspace(0.0, 0.2, 5)
+    costs = np.tile(1.0 + 0.05 * np.arange(5.0), (5, 1))
+    costs[4, 4] = costs[0, 0] = np.nan
+    reasons = [["" if np.isfinite(cost) else "no motion" for cost in row] for row in costs]
+    reasons[4][4] = "out of reach at t = 0 s"
+    shown = sm.placement.PlaceMap(
+        ("x", "y"), across, up, costs, tuple(map(tuple, reasons)), np.array([[-0.1, 0.1]])
+    )
+    drawn = picture_of(shown)
+    told = [word for word in ("+5%", "+10%", "+25%", "+50%") if word in drawn]
+    assert told == ["+5%", "+10%"]
+    # The one of 5 % is a column's width from the first, in every row of cells but that of the NaN.
+    first = next(part for part in drawn.split('<path d="')[1:])
+    ends = [
+        float(point.split(",")[0]) for point in first.split('"')[0].replace("L", "M").split("M")[1:]
+    ]
+    assert len(set(ends)) == 1
+    assert "in reach, but no plan" in legend_of(shown)
+    assert "out of reach" in legend_of(shown)
+    assert "x +100 mm, y +200 mm: out of reach at t = 0 s" in drawn
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("x", 0.0068371, "+6.84 mm"),
+        ("y", -0.2, "\N{MINUS SIGN}200 mm"),
+        ("z", 0.0, "0 mm"),
+        ("yaw", np.pi / 7, "+25.7°"),
+        ("yaw", 1e-9, "0°"),
+    ],
+)
+def test_places_are_told_with_three_digits_and_a_unit(name: str, value: float, text: str) -> None:
+    assert in_unit(name, value) == text

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from support.dragging import drag, settled, turn
 from support.layouts import WIDTHS, chromium, faults
 from support.views import CIRCLE, Served, served
 
@@ -16,10 +17,8 @@ pytestmark = pytest.mark.site
 
 # So often each handle is dragged, and each slider moved; `make bench NAME=view` does so more often.
 TIMES = 3
-# How far the mouse goes [px].
-PIXELS = 5.0
 # What tells, and what is worked with.
-TEXTS = ("h1", "#verdict", "#told", "#change h2", "#figures dd", "#sliders span", "#sliders output")
+TEXTS = ("h1", "#verdict", "#told", "#change h2", "#figures dd", "#sliders span")
 BOXES = (
     "#said", "#legend", "#layers", "#play", "#time", "#undo", "#save", "#export", "#handles button",
     "#turns", "#letgo", "#sliders input", "#figures", "#jog", "#measure",
@@ -63,44 +62,12 @@ def page(browser: Any, server: Served) -> Any:
     page.close()
 
 
-# What of the scene moves when it is dragged: its mark, as the mouse has it.
-GRAB = """(axis) => {
-  const { controls, shown, name } = replay.live.handles;
-  const { mark } = shown.get(name);
-  viewer.scene.updateMatrixWorld(true);
-  const box = viewer.renderer.domElement.getBoundingClientRect();
-  const seen = (point) => {
-    const { x, y } = point.clone().project(viewer.camera);
-    return [box.left + (0.5 + x / 2) * box.width, box.top + (0.5 - y / 2) * box.height];
-  };
-  const at = new THREE.Vector3().setFromMatrixPosition(mark.matrixWorld);
-  // The arrow of an axis ends at half of the control's size, which is the same on each screen.
-  const high = 1.9 * Math.tan((Math.PI * viewer.camera.fov) / 360);
-  const size = (at.distanceTo(viewer.camera.position) * high * controls.size) / 4;
-  const ahead = (part) => at.clone().add(new THREE.Vector3().setComponent(axis, part * size));
-  return [seen(ahead(0.35)), seen(ahead(0.45))];
-}"""
-
-
 SEEN = """(name) => {
   const { x, y } = new THREE.Vector3().setFromMatrixPosition(
     replay.live.handles.shown.get(name).mark.matrixWorld).project(viewer.camera);
   const box = viewer.renderer.domElement.getBoundingClientRect();
   return [box.left + (0.5 + x / 2) * box.width, box.top + (0.5 - y / 2) * box.height];
 }"""
-
-
-def settled(page: Any, server: Served) -> sm.Plan:
-    """Return the plan that is shown when all that was asked for is answered."""
-    page.wait_for_function(
-        """() => {
-          const { asked, answered } = replay.live;
-          const { live } = document.documentElement.dataset;
-          return asked === answered && ["verified", "stopped"].includes(live);
-        }""",
-        timeout=60_000,
-    )
-    return server.session.found.plan
 
 
 def saved(page: Any, server: Served) -> sm.Plan:
@@ -115,21 +82,6 @@ def saved(page: Any, server: Served) -> sm.Plan:
 def assert_same(shown: sm.Plan, plan: sm.Plan) -> None:
     np.testing.assert_array_equal(shown.trajectory.q, plan.trajectory.q)
     assert shown.report.cost == plan.report.cost
-
-
-def drag(page: Any, name: str, way: float) -> None:
-    """Drag a handle by the mouse, by the arrow of x, there or back."""
-    if page.locator(f"[data-handle='{name}']").get_attribute("aria-pressed") != "true":
-        page.locator(f"[data-handle='{name}']").click()
-    page.locator("#view").scroll_into_view_if_needed()
-    (x, y), (ahead, below) = page.evaluate(GRAB, 0)
-    along = np.array([ahead - x, below - y])
-    along *= way * PIXELS / np.linalg.norm(along)
-    page.mouse.move(x, y)
-    page.mouse.down()
-    for share in (0.3, 0.6, 1.0):
-        page.mouse.move(*(np.array([x, y]) + share * along))
-    page.mouse.up()
 
 
 @pytest.mark.parametrize("name", ["path", "base", "post"])
@@ -150,18 +102,7 @@ def test_the_tool_is_turned(page: Any, server: Served) -> None:
     page.locator("[data-handle=tool]").click()
     assert page.evaluate("replay.live.handles.controls.mode") == "rotate"
     for k in range(TIMES):
-        # By what the ring of z does when it is dragged.
-        page.evaluate(
-            """(angle) => {
-              const { handles } = replay.live;
-              const { mark } = handles.shown.get("tool");
-              handles.grip(true);
-              mark.rotateZ(angle);
-              handles.dragged();
-              handles.grip(false);
-            }""",
-            0.05 if k % 2 == 0 else -0.03,
-        )
+        turn(page, "tool", 0.05 if k % 2 == 0 else -0.03)
         shown = settled(page, server)
     assert "tool_offset" in server.session.edited.document["robot"]
     assert_same(shown, saved(page, server))
@@ -178,6 +119,20 @@ def test_a_slider_is_moved_and_the_plan_follows(page: Any, server: Served, name:
     assert shown.certificate.verified
     assert int(slider.input_value()) == place
     assert_same(shown, saved(page, server))
+
+
+def test_a_number_is_typed(page: Any, server: Served) -> None:
+    page.locator("[data-typed=clearance]").fill("20")
+    page.locator("[data-typed=clearance]").press("Enter")
+    shown = settled(page, server)
+    assert server.session.edited.document["clearance"]["distance_mm"] == 20.0
+    assert shown.certificate.verified
+    page.locator("[data-typed=clearance]").fill("2000")
+    page.locator("[data-typed=clearance]").press("Enter")
+    page.wait_for_selector("#told.bad")
+    assert "expected 0 to 100" in page.locator("#told").inner_text()
+    page.locator("#undo").click()
+    settled(page, server)
 
 
 def test_undo_goes_back(page: Any, server: Served) -> None:

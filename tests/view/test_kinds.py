@@ -1,16 +1,20 @@
 """Jobs, plans and programs on the page: what is planned, what is saved, what is only shown."""
 
+import contextlib
+import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import PlanError, ProblemError
+from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.model.task import SE3
 from selfmotion.shell.view import Sitting, opened as open_page
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.handles import dragged, handles_of
+from support.industrial import two_seams
 from support.views import CIRCLE, Heard, moved, opened
 
 # Two seams beside each other; without a clearance, so that they are planned soon.
@@ -121,6 +125,37 @@ def test_a_program_is_shown_as_it_is(page, tmp_path):
     assert sitting.export(".csv") == page.session.export(".csv")
 
 
+def test_a_controllers_program_is_judged_by_its_job(tmp_path):
+    """As `selfmotion check` does: what is wrong with it is said, and its seam is red."""
+    program = two_seams()
+    job, file = tmp_path / "job.program", tmp_path / "job.src"
+    program.save(job)
+    signals = {"arc on": (1, True), "arc off": (1, False)}
+    # The page writes it as its settings say.
+    sitting = open_page(job)
+    with pytest.raises(ProblemError, match="has no signal"):
+        sitting.export(".src")
+    sitting.settings = sm.files.ProgramSettings(signals=signals)
+    file.write_bytes(sitting.export(".src"))
+    shown = Heard(open_page(file, job=job)).messages[-1]
+    assert shown["plans"][0]["verified"]
+    names = [step["name"] for step in shown["plans"][0]["steps"]]
+    assert names == [step.name for step in program.steps]
+    broken = tmp_path / "broken.src"
+    # One target in the middle is taught elsewhere.
+    targets = list(re.finditer(r"A1 (-?[\d.]+)", file.read_text()))
+    first, last = targets[len(targets) // 2].span(1)
+    text = file.read_text()
+    broken.write_text(f"{text[:first]}{float(text[first:last]) + 2.0:.6f}{text[last:]}")
+    shown = Heard(open_page(broken, job=job)).messages[-1]
+    assert shown["words"].startswith("not verified: ")
+    assert not shown["plans"][0]["verified"]
+    with pytest.raises(ProblemError, match=r"give the \.program that it was made of as --robot"):
+        open_page(file)
+    with pytest.raises(ProblemError, match="has no use for --robot"):
+        open_page(job, job=job)
+
+
 def test_a_seam_without_a_part_is_dragged_itself():
     document = tomllib.loads(JOB)
     del document["workpiece"]
@@ -158,3 +193,29 @@ def test_a_plan_is_shown_as_it_is_changed_and_saved_with_its_problem(plan, tmp_p
         session.answer({"do": "undo"})
         planned(page)
         np.testing.assert_array_equal(session.found.plan.trajectory.q, plan.trajectory.q)
+
+
+def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
+    """Its numbers stand beside the own ones, its arm is the ghost; what is no plan is refused."""
+    file = tmp_path / "circle.npz"
+    plan.save(file)
+    data = file.read_bytes()
+    sitting = open_page(file)
+    with contextlib.closing(sitting):
+        shown = Heard(sitting)
+        other = sm.plan(replace(plan.problem, costs=(sm.costs.InverseManipulability(1.0),)))
+        other.save(tmp_path / "other.npz")
+        sitting.show_beside("other.npz", (tmp_path / "other.npz").read_bytes())
+        found = shown.messages[-1]
+        assert found["beside"] == "other.npz"
+        costs = next(row["cells"] for row in found["table"] if row["label"] == "cost")
+        own, beside = (float(value) for value, _ in costs)
+        assert own == pytest.approx(plan.report.cost, rel=1e-5)
+        assert beside == pytest.approx(other.evaluate(*plan.problem.costs), rel=1e-5)
+        assert beside > own
+        with pytest.raises(FileFormatError, match=r"^broken\.npz"):
+            sitting.show_beside("broken.npz", b"no plan")
+        sitting.show_beside("", b"")
+        assert shown.messages[-1]["beside"] == ""
+    with pytest.raises(ProblemError, match="here are several seams"):
+        page.session.show_beside("circle.npz", data)

@@ -139,6 +139,22 @@ def test_files_are_exported(server):
     assert "expected one of" in text
 
 
+def test_a_plan_beside_is_for_who_has_the_token(server):
+    address = f"http://127.0.0.1:{server.port}/beside?name=a.npz"
+    for token, origin, status in (
+        ("", None, 403),
+        (TOKEN, "http://evil.example", 403),
+        (TOKEN, None, 409),
+    ):
+        asked = urllib.request.Request(f"{address}&token={token}", data=b"no plan")
+        if origin:
+            asked.add_header("Origin", origin)
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(asked, timeout=60)
+        assert refused.value.code == status
+    assert refused.value.read().decode().startswith("a.npz: ")
+
+
 def test_a_port_that_is_taken_is_told():
     bound = listening(0)
     bound.listen()

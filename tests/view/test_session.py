@@ -77,6 +77,30 @@ def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     assert "stopped" not in page.messages[-1]
 
 
+def test_places_in_reach_are_told_while_something_is_dragged_and_no_longer(page):
+    """They are those of the document that is shown: a path that is lifted has others."""
+
+    def places(by):
+        page.drag("path", by, final=False)
+        last(page)
+        return page.messages[-1]["floor"]["places"], page.session.found.floor
+
+    _, before = places(moved(x=0.02, y=0.01))
+    _, same = places(moved(y=-0.03))
+    np.testing.assert_allclose(same.places, before.places, atol=1e-6)
+    np.testing.assert_array_equal(same.reached, before.reached)
+    _, lifted = places(moved(z=0.3))
+    assert lifted.reached.sum() < before.reached.sum()
+    page.drag("path", moved(z=-0.3))
+    last(page)
+    assert "floor" not in page.messages[-1]
+    # Tools and posts stand wherever they are put.
+    page.drag("post", moved(x=0.01), final=False)
+    last(page)
+    assert "floor" not in page.messages[-1]
+    page.drag("post", moved(x=-0.01))
+
+
 def test_a_coarse_motion_comes_first_and_says_that_it_is_none(page):
     count = len(page.messages)
     page.drag("path", moved(y=0.01))

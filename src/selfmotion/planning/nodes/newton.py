@@ -184,7 +184,7 @@ class _Solver:
             return Status.GRADIENT
         while True:
             step = self._step(system)
-            last = not self._multipliers.size or self._barrier <= self._last_barrier
+            last = self._is_last_barrier
             self._multiplier_change = _relative_change(self, step.multipliers)
             converged = last and _is_converged(self)
             converged &= self._multiplier_change <= SETTINGS.multiplier_tolerance
@@ -202,6 +202,11 @@ class _Solver:
                 self._last_barrier,
                 min(SETTINGS.kappa_mu * self._barrier, self._barrier**SETTINGS.theta_mu),
             )
+
+    @property
+    def _is_last_barrier(self) -> bool:
+        """Whether μ does not fall any more; without active rows there is no barrier."""
+        return not self._multipliers.size or self._barrier <= self._last_barrier
 
     @property
     def _rows(self) -> ElasticRows:
@@ -230,8 +235,8 @@ class _Solver:
     def _predicts_convergence(self) -> bool:
         """Whether quadratic convergence predicts no further decrease."""
         promised = self._predicted / self._cost_scale
-        full, last = self._length == 1.0, self._barrier <= self._last_barrier
-        if not (full and promised <= SETTINGS.quadratic_share and last):
+        full = self._length == 1.0
+        if not (full and promised <= SETTINGS.quadratic_share and self._is_last_barrier):
             return False
         if self._multiplier_change > np.sqrt(SETTINGS.multiplier_tolerance):
             return False
@@ -244,20 +249,8 @@ class _Solver:
     def _move(self, model: Model, step: Change) -> Status | None:
         """Line search on the merit function along a step."""
         motion, r = self.motion, step.nodes.shape[1] // 3
-        gap = float(np.abs(motion.c).sum() + np.abs(self._residuals).sum())
-        slope = float((model.gradient * step.nodes).sum()) + float(
-            np.sum(
-                (self._rho - self._barrier / self._elastics) * step.elastics
-                - self._barrier / self._slacks * step.slacks
-            )
-        )
-        if gap > 0.0:
-            # Makes the step a direction of descent of the merit function [NW 18.36].
-            dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
-            self._merit_penalty = max(self._merit_penalty, 2.0 * slope / gap, dearest)
-        self._merit_penalty = max(self._merit_penalty, SETTINGS.min_merit_penalty * self._rho)
+        promise = _raise_merit_penalty(self, model, step)
         merit = _merit(self, motion, self._slacks, self._elastics)
-        promise = slope - self._merit_penalty * gap
         largest = float(np.abs(step.nodes[:, :r]).max())
         length = SETTINGS.max_change / max(largest, SETTINGS.max_change)
         for values, change in ((self._slacks, step.slacks), (self._elastics, step.elastics)):
@@ -358,6 +351,26 @@ def _complementarity_residual(solver: _Solver) -> float:
     by_slack = np.abs(solver._slacks * solver._multipliers - solver._barrier).max(initial=0.0)
     room = solver._elastics * (solver._rho - solver._multipliers)
     return float(max(by_slack, np.abs(room - solver._barrier).max(initial=0.0)))
+
+
+def _raise_merit_penalty(solver: _Solver, model: Model, step: Change) -> float:
+    """Make a step a direction of descent of the merit function; return its derivative along it.
+
+    Along Newton's step residuals close to first order, so that the derivative is that of cost and
+    barrier terms minus ν times all residuals, with the penalty ν [NW 18.36].
+    """
+    slope = float((model.gradient * step.nodes).sum()) + float(
+        np.sum(
+            (solver._rho - solver._barrier / solver._elastics) * step.elastics
+            - solver._barrier / solver._slacks * step.slacks
+        )
+    )
+    gap = float(np.abs(solver.motion.c).sum() + np.abs(solver._residuals).sum())
+    if gap > 0.0:
+        dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
+        solver._merit_penalty = max(solver._merit_penalty, 2.0 * slope / gap, dearest)
+    solver._merit_penalty = max(solver._merit_penalty, SETTINGS.min_merit_penalty * solver._rho)
+    return slope - solver._merit_penalty * gap
 
 
 def _merit(solver: _Solver, motion: NodeMotion, slacks: Array, elastics: Array) -> float:

@@ -6,11 +6,15 @@ from typing import Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import documents, jobs, options
+from selfmotion.shell.cli import documents, jobs, options, outputs
 from selfmotion.shell.cli.app import LOOK, app, stages, terminal
+from selfmotion.shop import controllers
 
 # What a page can show.
-_SUFFIXES = (*documents.SUFFIXES, ".yaml", ".yml", ".npz", jobs.PROGRAM, jobs.PARTS)
+_SUFFIXES = (
+    *(*documents.SUFFIXES, ".yaml", ".yml"),
+    *(".npz", jobs.PROGRAM, jobs.PARTS, *controllers.READ_PROGRAMS),
+)
 
 
 @app.command(epilog="Example: selfmotion view cell.toml", rich_help_panel=LOOK)
@@ -19,6 +23,11 @@ def view(
         Path,
         typer.Argument(help="A problem or job file (.toml, .json), a plan (.npz), or a .program."),
     ],
+    robot: Annotated[
+        Path | None,
+        typer.Option(help="Of a controller's program (.src, .mod …): the .program it was made of."),
+    ] = None,
+    settings: outputs.SettingsOption = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of this machine; 0 for a free one.")
     ] = 0,
@@ -30,20 +39,24 @@ def view(
     """Drag the part, the base, obstacles on a page, slide numbers, and see the plan follow.
 
     Of a job all of its seams are planned, with the moves between them. A plan's own problem is
-    changed, and saved with its plan; a program is shown as it is, and judged as `check` does. The
-    page is served on this machine only, to who has its address; the file changes when it is
-    saved. Ends with Ctrl-C. Needs the extra `view`.
+    changed, and saved with its plan; a program is shown as it is, and judged as `check` does, a
+    controller's by the `--robot` that it was made of. The page is served on this machine only, to
+    who has its address; the file changes when it is saved. Ends with Ctrl-C. Needs the extra
+    `view`.
     """
     from selfmotion.shell import view as pages
 
     pages.check_server()
-    if file.suffix not in _SUFFIXES:
+    if file.suffix.lower() not in _SUFFIXES:
         raise sm.errors.ProblemError(
             f"{file}: has suffix '{file.suffix}', expected a problem file or a job file (.toml, "
-            f".json, .yaml), a plan (.npz), or a {jobs.PROGRAM} or {jobs.PARTS} file"
+            f".json, .yaml), a plan (.npz), a {jobs.PROGRAM} or {jobs.PARTS} file, or a program of "
+            f"a controller with its {jobs.PROGRAM} as --robot"
         )
+    asked = None if settings is None else sm.files.read_program_settings(settings)
     with stages.status("planning …"):
-        session = pages.opened(file, allow_code=allow_code)
+        session = pages.opened(file, allow_code=allow_code, job=robot)
+    session.settings = asked
     pages.serve(session, port=port, opens=not no_open, told=_tell)
 
 

@@ -131,6 +131,7 @@ def page_content(
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
         "radius": box.radius,
+        "ground": float(box.low[2]),
         "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),
@@ -167,13 +168,17 @@ def plan_content(
     whole: Whole | None = None,
     brief: bool = False,
     maps: Sequence[SeamMaps] = (),
+    beside: Plan | None = None,
 ) -> Json:
     """Return what of a page is another with another plan, in a scene of that radius [m].
 
-    With the redundancy maps that are given; a `brief` one without distances and self-motions.
+    With the redundancy maps that are given; a `brief` one without distances and self-motions. The
+    ghost is the plan `beside` where there is one, and the table has both.
     """
     motion = _Motion(plan, whole, brief=brief, with_map=False)
     motion.maps += maps
+    if beside is not None:
+        motion.ghost = key_frames(beside.robot, beside.trajectory)
     scale = _scale([motion])
     root = "/selfmotion/plan0"
     longest = float(np.linalg.norm(motion.shown.ellipsoid, axis=(1, 2)).max())
@@ -182,7 +187,7 @@ def plan_content(
         "ellipsoidSize": _ELLIPSOID_LENGTH * radius / longest,
         "joints": _joints(plan),
         "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
-        "table": _facts([plan], whole),
+        "table": _facts([plan], whole) if beside is None else _compared(plan, beside),
     }
 
 
@@ -199,6 +204,16 @@ def _facts(plans: list[Plan], whole: Whole | None) -> list[Json]:
     if whole is None:
         return table(plans)
     return [{"label": label, "cells": [cell]} for label, cell in whole.facts.items()]
+
+
+def _compared(plan: Plan, beside: Plan) -> list[Json]:
+    """Return the rows of two plans, both with the cost that the first one has to have least of."""
+    rows = table([plan, beside])
+    cost = sum(beside.evaluate(item) for item in plan.problem.costs)
+    for row in rows:
+        if row["label"] == "cost":
+            row["cells"] = [row["cells"][0], (f"{cost:.6g}", "by the costs of this one")]
+    return rows
 
 
 def _missing(arm: links.Arm, plans: int) -> list[Json]:

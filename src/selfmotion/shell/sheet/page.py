@@ -28,6 +28,11 @@ section { break-inside: avoid } td.numbered { border-left: 1.2mm solid; padding-
 figure { margin: 2mm 0; break-inside: avoid } figure svg { width: 100%; max-height: 90mm }
 .release td { padding-top: 14mm; border-top: 0; color: #555; font-size: 9pt }
 .release span { display: block; border-top: .2mm solid #222; padding-top: 1mm }
+@media screen and (max-width: 40em) {
+  body { font-size: 9pt; padding: 0 3mm; margin: 3mm auto }
+  section { overflow-x: auto } td, th { padding-right: 2mm }
+  td:first-child:not(:last-child) { min-width: 12mm }
+}
 @media print { body { margin: 0; padding: 0; max-width: none } }
 """
 

@@ -8,6 +8,7 @@ from selfmotion.model.path import Path
 from selfmotion.planning.result import Parts, Plan
 from selfmotion.shell.replay.redundancy import SeamMaps
 from selfmotion.shell.replay.whole import Whole
+from selfmotion.shell.view.floor import Floor
 from selfmotion.work.job import Program
 
 
@@ -20,10 +21,13 @@ class Request:
     number : int
         Requests are counted; the last one counts.
     document : dict
+    drag : (int, str) or None
+        While a handle is dragged: the how manieth drag it is, and the handle's name.
     """
 
     number: int
     document: Mapping[str, Any]
+    drag: tuple[int, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,8 @@ class Found:
         Of a job the paths of the seams that are not made.
     maps : tuple of SeamMaps
         Redundancy maps, when they are made.
+    floor : Floor or None
+        While a handle is dragged: where it could be as well.
     is_brief : bool
         Whether there is more to tell of it, which takes longer: distances, the redundancy map.
     """
@@ -60,6 +66,7 @@ class Found:
     made: Program | Parts | None = None
     unmade: tuple[Path, ...] = ()
     maps: tuple[SeamMaps, ...] = ()
+    floor: Floor | None = None
     is_brief: bool = True
 
     @property

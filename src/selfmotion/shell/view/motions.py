@@ -103,6 +103,12 @@ def shown_program(program: Program) -> Whole:
     return _joined(program.steps, {}, problem, program.verdict)
 
 
+def shown_as_written(program: Program, written: Sequence[Trajectory], words: str) -> Whole:
+    """Return a program with the motions (one for each step) that a controller makes of it."""
+    problem = next(iter(program.plans.values())).problem
+    return _joined(program.steps, dict(enumerate(written)), problem, words)
+
+
 def _joined(
     steps: Sequence[Step], put: Mapping[int, Trajectory], problem: Problem, words: str
 ) -> Whole:

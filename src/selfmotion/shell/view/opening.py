@@ -1,23 +1,27 @@
 """What a page shows of a file, by what the file is."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from selfmotion.basics import SelfmotionError
+from selfmotion.basics import ProblemError, SelfmotionError
 from selfmotion.planning.result import Parts, load_parts, load_plan
 from selfmotion.shell.documents import job_of
 from selfmotion.shell.replay.whole import Whole
 from selfmotion.shell.view.document import EditedPlan
 from selfmotion.shell.view.found import Found, Request
-from selfmotion.shell.view.motions import shown_program
+from selfmotion.shell.view.motions import shown_as_written, shown_program
 from selfmotion.shell.view.session import Session
 from selfmotion.shell.view.sitting import Sitting
+from selfmotion.shop import controllers
 from selfmotion.work.job import Program, load_program
 
 # What nothing asks for is of no document.
 _NOTHING = Request(0, {})
+# So many steps that are not verified are told.
+_TOLD = 3
 
 
-def opened(file: Path, *, allow_code: bool = False) -> Sitting:
+def opened(file: Path, *, allow_code: bool = False, job: Path | None = None) -> Sitting:
     """Return the page of a problem file, a job file, a plan, a program or a motion in parts.
 
     Plans, programs and parts are judged anew, as `selfmotion check` does.
@@ -25,15 +29,26 @@ def opened(file: Path, *, allow_code: bool = False) -> Sitting:
     Parameters
     ----------
     file : Path
-        .toml, .json, .yaml; .npz; .program; .parts.
+        .toml, .json, .yaml; .npz; .program; .parts; or a controller's program.
     allow_code : bool
         Whether code that a document names is run.
+    job : Path, optional
+        The .program that a controller's program was made of.
 
     Raises
     ------
     FileFormatError
         The file cannot be read, or is nothing that a page can show.
+    ProblemError
+        A controller's program without its job, or a job beside anything else.
     """
+    is_written = file.suffix.lower() in controllers.READ_PROGRAMS
+    if is_written != (job is not None):
+        expected = "is a controller's program: give the .program that it was made of as --robot"
+        unused = "has no use for --robot, which is for programs of controllers"
+        raise ProblemError(f"{file}: {expected if is_written else unused}")
+    if job is not None:
+        return _of_written(file, load_program(job))
     if file.suffix == ".npz":
         return _of_plan(file, allow_code)
     if file.suffix == ".program":
@@ -54,6 +69,22 @@ def _of_plan(file: Path, allow_code: bool) -> Sitting:
         sitting.open(Found(_NOTHING, "whole", plan.certificate.verdict, plan, is_brief=False))
         return sitting
     return Session(file, edited, allow_code=allow_code)
+
+
+def _of_written(file: Path, program: Program) -> Sitting:
+    """Return the page of a controller's program: as it is judged, and moves by its first way."""
+    judged = controllers.judged_program(file, program)
+    parts = controllers.parts_of(file, controllers.read_program(file, program.robot), program)
+    wrong = [step for step in judged.steps if not step.verified]
+    told = [f"'{step.name}': {step.verdict}" for step in wrong[:_TOLD]]
+    words = "; ".join([judged.verdict, *told])
+    whole = shown_as_written(program, [ways[0] for ways in parts.motions], words)
+    whole = replace(whole, verified=judged.verified)
+    seams = program.plans
+    unmade = tuple(seams[step.name].path for step in wrong if step.name in seams)
+    sitting = Sitting(file, f"{file.name} is shown as it is, and judged by its job")
+    sitting.open(Found(_NOTHING, "whole", words, whole.plan, whole, unmade=unmade, is_brief=False))
+    return sitting
 
 
 def _of_made(file: Path, made: Program | Parts) -> Sitting:

@@ -7,12 +7,12 @@ is `plan()` of what is saved: of the ways that lead to it, nothing is left.
 
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import ProblemError, Progress, SelfmotionError
+from selfmotion.basics import Array, ProblemError, Progress, SelfmotionError
 from selfmotion.model.follow import is_plain
 from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
@@ -20,7 +20,9 @@ from selfmotion.planning.result import Plan, retime
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
 from selfmotion.shell.view.document import is_job
+from selfmotion.shell.view.floor import Floor, floor_of
 from selfmotion.shell.view.found import Found, NewerRequest, Request
+from selfmotion.shell.view.handles import handles_of
 from selfmotion.shell.view.maps import maps_soon
 from selfmotion.shell.view.motions import (
     coarse,
@@ -67,6 +69,9 @@ class Planning:
         self._closed = False
         self._memory: dict[str, Any] = {}
         self._given = given
+        # The places in reach, and what they are of; those of the request that is answered.
+        self._places: tuple[Any, Floor | None] = None, None
+        self._floor: dict[int, Floor | None] = {}
         self._first: Found | None = None
         self.last: Plan | None = None
         self.last_program: Program | None = None
@@ -125,8 +130,10 @@ class Planning:
         answers = self._programs if is_job(request.document) else self._plans
         found = Found(request, "none", "", None)
         for found in answers(request):
+            # As long as the hand stays there what is found has them, too.
+            found = replace(found, floor=self._floor.get(request.number))
             self._tell(found)
-            self._leave(request)
+        self._leave(request)
         return found
 
     def _more(self, found: Found) -> None:
@@ -160,7 +167,9 @@ class Planning:
             return
         first = self._coarse(job.problem)
         if first is not None:
-            yield Found(request, "coarse", first.report.message, first)
+            begun = Found(request, "coarse", first.report.message, first)
+            yield from self._with_floor(begun, [job.problem], [first.trajectory.q])
+        self._leave(request)
         try:
             found = self._whole(request, job)
         except SelfmotionError as error:
@@ -186,12 +195,18 @@ class Planning:
         before = self.last_program
         if before is not None and before.robot.joint_names == job.robot.joint_names:
             first = coarse_program(job, before)
-            yield Found(request, "coarse", first.verdict, first.plan, first)
+            begun = Found(request, "coarse", first.verdict, first.plan, first)
+            near = {name: plan.trajectory.q for name, plan in before.plans.items()}
+            known = [k for k, seam in enumerate(job.seams) if seam.name in near]
+            problems = [job.problems[k] for k in known]
+            yield from self._with_floor(begun, problems, [near[job.seams[k].name] for k in known])
+            self._leave(request)
             early = self._early(request, job, before)
             if early is not None:
                 words = f"{early.verdict}; the best order is being looked for"
                 shown = shown_program(early)
                 yield Found(request, "early", words, shown.plan, shown, early)
+                self._leave(request)
         try:
             found = job.plan(progress=self._stage(request))
         except SelfmotionError as error:
@@ -204,6 +219,35 @@ class Planning:
         shown = shown_program(found)
         unmade = tuple(seam.path for seam in job.seams if seam.name in found.missing)
         yield Found(request, "whole", found.verdict, shown.plan, shown, found, unmade)
+
+    def _with_floor(
+        self, found: Found, problems: Sequence[Problem], near: Sequence[Array]
+    ) -> Iterator[Found]:
+        """Yield a first motion; while something is dragged with the places in reach.
+
+        These are looked for once for all that is moved to and fro.
+        """
+        request, plan = found.request, found.plan
+        if request.drag is None or plan is None:
+            yield found
+            return
+        number, name = request.drag
+        handle = handles_of(request.document, plan.problem).get(name)
+        if handle is None:
+            yield found
+            return
+        pose = handle.prefix * handle.pose
+        key = (number, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
+        known, floor = self._places
+        if known != key:
+            yield found
+            if known is not None and known[0] == number:
+                # There was one in this drag: others wait until the hand does.
+                self._leave(request)
+            floor = floor_of(problems, near, handle)
+            self._places = key, floor
+        self._floor = {request.number: floor}
+        yield found
 
     def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:
         """Return a verified program in the order before; None where there is none."""

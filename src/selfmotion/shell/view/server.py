@@ -15,6 +15,8 @@ from selfmotion.shell.view.sitting import Sitting
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import Response
     from starlette.websockets import WebSocket
 
 HOST = "127.0.0.1"
@@ -24,6 +26,8 @@ REFUSED, TAKEN = 4403, 4409
 _HTTP = 80
 # Messages of the page are short [bytes].
 _LONGEST = 65_536
+# Files of plans are smaller [bytes].
+_LARGEST = 2**28
 
 
 def check_server() -> None:
@@ -114,50 +118,95 @@ def configuration(app: "Starlette") -> Any:
 
 
 def application(session: Sitting, token: str, port: int) -> "Starlette":
-    """Return the application: the page, its connection, and the exported files."""
+    """Return the application: the page, its connection, exported files, and plans beside it."""
     from starlette.applications import Starlette
-    from starlette.requests import Request
-    from starlette.responses import HTMLResponse, PlainTextResponse, Response
     from starlette.routing import Route, WebSocketRoute
 
-    # Another name for this machine is one that a foreign page may have given it.
-    names = (HOST, "localhost")
-    # Browsers leave out the port of HTTP.
-    hosts = {f"{name}:{port}" for name in names} | set(names if port == _HTTP else ())
+    answers = _Answers(session, token, port)
+    routes = [
+        Route("/", answers.page),
+        Route("/export", answers.export),
+        Route("/beside", answers.beside, methods=["POST"]),
+        WebSocketRoute("/live", answers.live),
+    ]
+    return Starlette(routes=routes)
 
-    def refusal(request: "Request | WebSocket") -> str:
+
+class _Answers:
+    """What the server answers to who has the token, on this machine.
+
+    Parameters
+    ----------
+    session : Sitting
+    token : str
+    port : int
+        At which it is served.
+    """
+
+    def __init__(self, session: Sitting, token: str, port: int) -> None:
+        self._session, self._token, self._port = session, token, port
+        # Another name for this machine is one that a foreign page may have given it.
+        names = (HOST, "localhost")
+        # Browsers leave out the port of HTTP.
+        self._hosts = {f"{name}:{port}" for name in names} | set(names if port == _HTTP else ())
+
+    def _refusal(self, request: "Request | WebSocket") -> str:
         """Return why a request is refused; "" for none."""
-        if request.headers.get("host") not in hosts:
-            return f"this page is served as {HOST}:{port} only"
+        if request.headers.get("host") not in self._hosts:
+            return f"this page is served as {HOST}:{self._port} only"
         origin = request.headers.get("origin")
-        if origin is not None and origin.removeprefix("http://") not in hosts:
+        if origin is not None and origin.removeprefix("http://") not in self._hosts:
             return "another page asks for this one"
         given = request.query_params.get("token", "")
-        if not hmac.compare_digest(given.encode(), token.encode()):
+        if not hmac.compare_digest(given.encode(), self._token.encode()):
             return "the token is missing or wrong; open the address that `selfmotion view` printed"
         return ""
 
-    async def page(request: Request) -> Response:
-        if why := refusal(request):
-            return PlainTextResponse(f"refused: {why}\n", status_code=403)
-        return HTMLResponse(session.html, headers=_HEADERS)
+    async def page(self, request: "Request") -> "Response":
+        """Answer with the page."""
+        from starlette.responses import HTMLResponse
 
-    async def export(request: Request) -> Response:
-        if why := refusal(request):
-            return PlainTextResponse(f"refused: {why}\n", status_code=403)
+        if why := self._refusal(request):
+            return _refused(why)
+        return HTMLResponse(self._session.html, headers=_HEADERS)
+
+    async def export(self, request: "Request") -> "Response":
+        """Answer with the motion as a file."""
+        from starlette.responses import PlainTextResponse, Response
+
+        if why := self._refusal(request):
+            return _refused(why)
         suffix = request.query_params.get("as", "")
         try:
-            data = await asyncio.to_thread(session.export, suffix)
+            data = await asyncio.to_thread(self._session.export, suffix)
         except SelfmotionError as error:
             return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
         # Headers are Latin-1: other letters of the name are told as those of an address are.
-        name = quote(f"{session.file.stem}{suffix}", safe="", errors="replace")
+        name = quote(f"{self._session.file.stem}{suffix}", safe="", errors="replace")
         headers = {**_HEADERS, "Content-Disposition": f"attachment; filename*=UTF-8''{name}"}
         return Response(data, media_type="application/octet-stream", headers=headers)
 
-    async def live(connection: "WebSocket") -> None:
+    async def beside(self, request: "Request") -> "Response":
+        """Take the file of a plan that is shown beside the own one; an empty one for none."""
+        from starlette.responses import PlainTextResponse
+
+        if why := self._refusal(request):
+            return _refused(why)
+        name, data = request.query_params.get("name", "plan"), bytearray()
+        async for part in request.stream():
+            data += part
+            if len(data) > _LARGEST:
+                return PlainTextResponse(f"{name}: is too large for a plan\n", status_code=413)
+        try:
+            await asyncio.to_thread(self._session.show_beside, name, bytes(data))
+        except SelfmotionError as error:
+            return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
+        return PlainTextResponse("", headers=_HEADERS)
+
+    async def live(self, connection: "WebSocket") -> None:
+        """Hear and tell, as long as the page is open."""
         await connection.accept()
-        if why := refusal(connection):
+        if why := self._refusal(connection):
             await connection.close(REFUSED, why[:100])
             return
         outgoing: asyncio.Queue[bytes] = asyncio.Queue()
@@ -166,20 +215,19 @@ def application(session: Sitting, token: str, port: int) -> "Starlette":
         def send(data: bytes) -> None:
             loop.call_soon_threadsafe(outgoing.put_nowait, data)
 
-        if not await asyncio.to_thread(session.attach, send):
+        if not await asyncio.to_thread(self._session.attach, send):
             await connection.close(TAKEN, "another tab has this page")
             return
         try:
-            await _both(connection, session, outgoing)
+            await _both(connection, self._session, outgoing)
         finally:
-            session.detach()
+            self._session.detach()
 
-    routes = [
-        Route("/", page),
-        Route("/export", export),
-        WebSocketRoute("/live", live),
-    ]
-    return Starlette(routes=routes)
+
+def _refused(why: str) -> "Response":
+    from starlette.responses import PlainTextResponse
+
+    return PlainTextResponse(f"refused: {why}\n", status_code=403)
 
 
 _HEADERS = {

@@ -48,7 +48,7 @@ class Session(Sitting):
         super().__init__(file)
         self.edited = Edited(file) if edited is None else edited
         self._begun = dict(self.edited.document)
-        self._number = self._mark = 0
+        self._number = self._mark = self._drags = 0
         # The last plan of a document that describes a problem, and what of that can be changed.
         self._known: Plan | None = None
         self._handles: dict[str, Handle] = {}
@@ -122,8 +122,10 @@ class Session(Sitting):
         if handle is None:
             self._refuse(asked, self._handles)
         values = dragged(self.edited.document, handle, _pose(asked.get("matrix")))
-        self.edited.change(values, final=bool(asked.get("final")))
-        self._ask()
+        final = bool(asked.get("final"))
+        self.edited.change(values, final=final)
+        self._ask(None if final else (self._drags, handle.name))
+        self._drags += final
 
     def _slide(self, asked: Mapping[str, Any]) -> None:
         slider = self._sliders.get(str(asked.get("name")))
@@ -154,9 +156,9 @@ class Session(Sitting):
 
     # The planner.
 
-    def _ask(self) -> None:
+    def _ask(self, drag: tuple[int, str] | None = None) -> None:
         self._number += 1
-        self._planning.ask(Request(self._number, self.edited.document))
+        self._planning.ask(Request(self._number, self.edited.document, drag))
 
     @override
     def _state(self) -> Json:

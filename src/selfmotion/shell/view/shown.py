@@ -36,14 +36,18 @@ class Shown:
         """Note half the size of the scene [m], and the arm, as the page is made with them."""
         self._radius, self._robot = radius, robot
 
-    def message(self, found: Found, state: Json) -> bytes:
-        """Return what was found, and the state of the document, as the page reads them."""
+    def message(self, found: Found, state: Json, beside: tuple[str, Plan] | None = None) -> bytes:
+        """Return what was found, and the state of the document, as the page reads them.
+
+        With the plan that is shown `beside`, by its name.
+        """
         payload = Payload()
         content: Json = {
             "number": found.request.number,
             "kind": found.kind,
             "words": found.words,
             "brief": found.is_brief,
+            "beside": "" if beside is None else beside[0],
             **state,
         }
         plan = found.plan
@@ -57,10 +61,13 @@ class Shown:
                 whole=found.whole,
                 brief=found.is_brief,
                 maps=found.maps,
+                beside=None if beside is None else beside[1],
             )
             if found.kind != "coarse" and not found.verified:
                 content["stopped"] = list(stopping(found, payload, self._radius))
             content |= self._arm(plan, payload)
+            if found.floor is not None:
+                content["floor"] = found.floor.json(payload)
             content["handles"] = handles_json(found.request.document, plan)
         return payload.data(content)
 

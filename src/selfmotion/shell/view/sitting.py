@@ -6,13 +6,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from selfmotion.basics import PlanError, ProblemError
-from selfmotion.planning.result import Parts
+from selfmotion.basics import FileFormatError, PlanError, ProblemError
+from selfmotion.planning.result import Parts, Plan, load_plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
 from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.shown import Shown
-from selfmotion.shop.controllers import write_motion
+from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion
 
 # Files that motions are exported to, by suffix, and how the page calls them.
 _OF_MOTIONS = {
@@ -43,7 +43,10 @@ class Sitting:
 
     def __init__(self, file: Path, why: str = "") -> None:
         self.file, self._why = file, why
+        # How programs of controllers are written; None for what these settings are by default.
+        self.settings: ProgramSettings | None = None
         self._found: Found | None = None
+        self._beside: tuple[str, Plan] | None = None
         self._html, self._shown = "", Shown()
         self._send: Callable[[bytes], None] | None = None
         self._lock, self._telling = threading.RLock(), threading.Lock()
@@ -86,6 +89,9 @@ class Sitting:
         found = self._found
         if found is None or found.whole is None:
             return _OF_PLANS
+        if found.made is None:
+            # A motion of a controller's own program is there already.
+            return {}
         return _OF_PARTS if isinstance(found.made, Parts) else _OF_PROGRAMS
 
     def close(self) -> None:
@@ -121,12 +127,48 @@ class Sitting:
         # One after the other, so that an older message never comes last.
         with self._telling:
             with self._lock:
-                found, send = self._found, self._send
+                found, send, beside = self._found, self._send, self._beside
                 if found is None or send is None:
                     return
                 state = {**self._state(), "answers": self._answered(found)}
             # The page may go on to ask while this is made.
-            send(self._shown.message(found, state))
+            send(self._shown.message(found, state, beside))
+
+    def show_beside(self, name: str, data: bytes) -> None:
+        """Show the plan of a file beside the own one; none where there are no `data`.
+
+        Raises
+        ------
+        FileFormatError
+            It is no plan.
+        ProblemError
+            It is of another arm, or here are several seams.
+        """
+        beside = None
+        if data:
+            with TemporaryDirectory(prefix="selfmotion-") as folder:
+                file = Path(folder) / "beside.npz"
+                file.write_bytes(data)
+                try:
+                    beside = name, load_plan(file)
+                except FileFormatError as error:
+                    text = str(error).replace(str(file), name)
+                    raise FileFormatError(text) from error
+            self._check_beside(*beside)
+        with self._lock:
+            self._beside = beside
+        self.tell()
+
+    def _check_beside(self, name: str, plan: Plan) -> None:
+        found = self._found
+        if found is None or found.plan is None or found.whole is not None:
+            raise ProblemError(f"{name}: a plan is shown beside a plan, and here are several seams")
+        own = found.plan.robot
+        if plan.robot.joint_names != own.joint_names or plan.robot.name != own.name:
+            raise ProblemError(
+                f"{name}: is of '{plan.robot.name}', expected a plan of '{own.name}' with the same "
+                f"joints"
+            )
 
     def _state(self) -> Json:
         return {"sliders": [], "changed": False, "undo": False}
@@ -170,5 +212,7 @@ class Sitting:
             if suffix in _OWN:
                 made.save(file)
             else:
-                write_motion(made, file)
+                # Others have none.
+                own = self.settings if suffix in (".script", *PROGRAMS) else None
+                write_motion(made, file, settings=own)
             return file.read_bytes()

@@ -45,6 +45,7 @@ from selfmotion.shop.controllers.program_settings import (
     ProgramSettings as ProgramSettings,
     read_program_settings as read_program_settings,
 )
+from selfmotion.shop.controllers.program_steps import parts_of as parts_of
 from selfmotion.shop.controllers.samples import (
     LinearDeviation as LinearDeviation,
     coarsest_rate as coarsest_rate,

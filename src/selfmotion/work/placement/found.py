@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +13,8 @@ from selfmotion.basics import Array, PlanError, as_whole
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
 from selfmotion.problem.problem import Problem
-from selfmotion.work.batch import Row, maps
-from selfmotion.work.placement.places import Places, Tried
+from selfmotion.work.placement.picture import picture_of
+from selfmotion.work.placement.places import Places, Tried, footprint
 from selfmotion.work.placement.search import Box
 
 if TYPE_CHECKING:
@@ -46,6 +45,11 @@ class PlaceMap:
         Of all plans together; NaN where a place fails.
     reasons : tuple of tuple of str
         Why it does; "" where it does not.
+    best : (B, 2)
+        The places to choose from, the cheapest first [m or rad].
+    outline : (P, 2)
+        What of the part is seen from above, about the best place; empty where the map is not of a
+        part in x and y [m].
     """
 
     names: tuple[str, str]
@@ -53,29 +57,12 @@ class PlaceMap:
     up: Array
     costs: Array
     reasons: tuple[tuple[str, ...], ...]
+    best: Array = field(default_factory=lambda: np.empty((0, 2)))
+    outline: Array = field(default_factory=lambda: np.empty((0, 2)))
 
     def svg(self) -> str:
-        """Return an SVG: a cell for each place, with the reason of a failure as its tooltip."""
-        rows: list[Row] = []
-        for i, high in enumerate(self.up.tolist()):
-            for j, far in enumerate(self.across.tolist()):
-                cost, reason = float(self.costs[i, j]), self.reasons[i][j]
-                settings = {_label(self.names[0]): far, _label(self.names[1]): high}
-                few = "out of reach" if "out of reach" in reason else "no plan"
-                rows.append(
-                    Row(
-                        f"place-{len(rows)}",
-                        "",
-                        Path(),
-                        {name: _rounded(value) for name, value in settings.items()},
-                        error=reason,
-                        reason=few,
-                        verified=not reason,
-                        cost=math.inf if reason else cost,
-                        aim=math.inf if reason else cost,
-                    )
-                )
-        return "\n".join(maps(rows, {}))
+        """Return an SVG: a cell for each place with its cost, or why it fails as its tooltip."""
+        return picture_of(self)
 
     def figure(self) -> Figure:
         """Return a matplotlib figure (``pip install 'selfmotion[plots]'``).
@@ -256,7 +243,17 @@ class Placement:
             up,
             np.where(np.isfinite(costs), costs, np.nan),
             tuple(tuple(found[i, j].reason for j in range(count)) for i in range(count)),
+            np.array([item.place[[first, second]] for item in self.best()]),
+            self._outline(chosen),
         )
+
+    def _outline(self, names: Sequence[str]) -> Array:
+        """Return the hull of the part from above, (P, 2), its middle at the place [m]."""
+        if self.of != "part" or tuple(names) != ("x", "y"):
+            return np.empty((0, 2))
+        points = footprint(self.problems, self._places.bodies)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        return np.asarray(points - middle + [self.place["x"], self.place["y"]])
 
     def _far(self, place: Array, other: Tried) -> float:
         return float(np.linalg.norm(self._box.share(place) - self._box.share(other.place)))
@@ -286,7 +283,3 @@ def on_bounds(places: Places, box: Box, place: Array) -> tuple[str, ...]:
 
 def _label(name: str) -> str:
     return f"{name} [{'m' if name in ('x', 'y', 'z') else 'rad'}]"
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")

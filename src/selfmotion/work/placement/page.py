@@ -8,13 +8,26 @@ from pathlib import Path
 
 from selfmotion.basics import ProblemError, as_path, shown, write_text
 from selfmotion.work.placement.found import PlaceMap, Placement
+from selfmotion.work.placement.picture import in_unit, legend_of
 
-_STYLE = (
-    "body{font-family:system-ui,sans-serif;margin:1.5em auto;padding:0 1em;max-width:70em}"
-    "svg{width:100%;height:auto}table{border-collapse:collapse}"
-    "td,th{padding:.2em .8em;text-align:right;border-bottom:1px solid #ddd}"
-    "@media(max-width:30em){td,th{padding:.2em .3em}h1{font-size:1.3em}}"
-)
+# Characters of a reason on the page, and how many of them.
+_LONGEST, _MOST_REASONS = 120, 8
+
+_STYLE = """
+body { font-family: system-ui, sans-serif; color: #222 }
+body { margin: 1em auto; padding: 0 1em; max-width: 76em }
+h1 { font-size: 1.4em; margin: 0 0 .3em } h2 { font-size: 1.05em; margin: 1em 0 .3em }
+p { margin: .3em 0 } svg { display: block; width: 100%; height: auto; max-height: 92vh }
+table { border-collapse: collapse } summary { cursor: pointer; margin: .6em 0 }
+td, th { padding: .25em .8em .25em 0; text-align: right; border-bottom: 1px solid #ddd }
+.key { display: flex; flex-wrap: wrap; gap: .2em 1.2em; margin: .4em 0; font-size: .9em }
+.key i { display: inline-block; width: 1.4em; height: .9em }
+.key i { margin-right: .4em; vertical-align: -1px }
+li { margin: .2em 0; overflow-wrap: anywhere }
+@media (min-width: 60em) {
+  main { display: grid; grid-template-columns: minmax(0, 1fr) 22em; gap: 0 2em; align-items: start }
+}
+"""
 
 
 def write_placement(placement: Placement, file: str | Path, places: PlaceMap | None = None) -> Path:
@@ -39,46 +52,76 @@ def write_placement(placement: Placement, file: str | Path, places: PlaceMap | N
         raise ProblemError(f"placement is {shown(placement)}, expected a Placement")
     path = as_path(file)
     title = f"Where to put the {placement.of}"
-    lines = "".join(f"<p>{html.escape(line)}</p>" for line in str(placement).splitlines())
+    lines = "".join(f"<p>{html.escape(line)}</p>" for line in _lines(placement))
     drawn = ""
     if places is not None:
-        first, second = places.names
-        told = f"The cost elsewhere, moved by {first} and {second}; all else as above."
-        drawn = f"<h2>Map</h2><p>{told}</p>{places.svg()}"
+        drawn = (
+            f'<section>{places.svg()}<div class="key">{legend_of(places)}</div>'
+            f"{_reasons(places)}</section>"
+        )
     write_text(
         path,
         f'<!doctype html><html lang="en"><meta charset="utf-8">'
         f'<meta name="viewport" content="width=device-width,initial-scale=1"><title>{title}</title>'
-        f"<style>{_STYLE}</style><h1>{title}</h1>{lines}{_choice(placement)}{drawn}</html>\n",
+        f"<style>{_STYLE}</style><h1>{title}</h1><main>{drawn}<section>{lines}"
+        f"{_choice(placement)}</section></main></html>\n",
     )
     return path
+
+
+def _lines(placement: Placement) -> list[str]:
+    """Return what was found, in words: three digits, and units."""
+    by = ", ".join(f"{name} {in_unit(name, value)}" for name, value in placement.place.items())
+    _, _, *rest = str(placement).splitlines()
+    count = len(placement.plans)
+    verified = "verified" if placement.verified else "NOT verified"
+    motions = f"{count} motion{'s' if count > 1 else ''}, {verified}"
+    before = "; there is no verified motion at the present place"
+    if math.isnan(placement.cost_before):
+        before = ""
+    elif math.isfinite(placement.cost_before):
+        before = f", {placement.cost_before:.3g} at the present place"
+    return [
+        f"Move the {placement.of} by {by}.",
+        f"Cost {placement.cost:.3g}{before}; {motions}.",
+        *rest,
+    ]
+
+
+def _reasons(places: PlaceMap) -> str:
+    """Return why places fail, once for all that fail alike: a phone has nothing to hover with."""
+    first, second = places.names
+    found: dict[str, list[str]] = {}
+    for up, row in zip(places.up.tolist(), places.reasons, strict=True):
+        for across, reason in zip(places.across.tolist(), row, strict=True):
+            if reason:
+                where = f"{first} {in_unit(first, across)}, {second} {in_unit(second, up)}"
+                found.setdefault(reason.split(":", 1)[0][:_LONGEST], []).append(where)
+    if not found:
+        return ""
+    items = "".join(
+        f"<li>{html.escape(reason)}: {html.escape(told[0])}"
+        f"{f' and {len(told) - 1} more' if len(told) > 1 else ''}</li>"
+        for reason, told in sorted(found.items(), key=lambda item: -len(item[1]))[:_MOST_REASONS]
+    )
+    return f"<details><summary>Why there is no plan elsewhere</summary><ul>{items}</ul></details>"
 
 
 def _choice(placement: Placement) -> str:
     """Return a table of the best places, with how much more each of them costs."""
     names = list(placement.place)
-    head = "".join(f"<th>{_label(name)}</th>" for name in names)
+    head = "".join(f"<th>{name}</th>" for name in names)
     rows = []
-    for item in placement.best():
+    for number, item in enumerate(placement.best(), 1):
         values = "".join(
-            f"<td>{_in_unit(name, float(value))}</td>"
+            f"<td>{in_unit(name, float(value))}</td>"
             for name, value in zip(names, item.place, strict=True)
         )
         more = item.cost / placement.cost - 1.0 if placement.cost else 0.0
-        rows.append(f"<tr>{values}<td>{item.cost:.3g}</td><td>{more:+.1%}</td></tr>")
+        rows.append(
+            f"<tr><td>{number}</td>{values}<td>{item.cost:.3g}</td><td>{more:+.1%}</td></tr>"
+        )
     return (
-        f"<h2>Places to choose from</h2><table><tr>{head}<th>cost</th><th>more</th></tr>"
+        f"<h2>Places to choose from</h2><table><tr><th></th>{head}<th>cost</th><th>more</th></tr>"
         f"{''.join(rows)}</table>"
     )
-
-
-def _label(name: str) -> str:
-    return f"{name} [{'mm' if name in _LENGTHS else '°'}]"
-
-
-def _in_unit(name: str, value: float) -> str:
-    """Return a displacement in mm, or a turn in degrees, with a sign."""
-    return f"{1e3 * value:+.1f}" if name in _LENGTHS else f"{math.degrees(value):+.1f}"
-
-
-_LENGTHS = ("x", "y", "z")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from selfmotion.basics import (
     presses,
     seconds_of_kernels,
 )
-from selfmotion.model.collision import Obstacle
+from selfmotion.model.collision import Obstacle, Solid
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.path import Path, Placed, spread_along
 from selfmotion.model.robot import root_place, with_moved_base
@@ -48,6 +49,8 @@ COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 _POSES = 5
 # Tries of inverse kinematics for each of them.
 _TRIES = 20
+# Points of a path in the outline of its part.
+_OUTLINED = 41
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,6 +335,29 @@ def _with_bodies(item: Clearance, names: frozenset[str], by: SE3) -> Clearance:
         replace(body, pose=by * body.pose) if moves(body) else body for body in item.obstacles
     )
     return replace(item, obstacles=bodies)
+
+
+def footprint(problems: Sequence[Problem], bodies: frozenset[str]) -> Array:
+    """Return the hull from above of paths and of the bodies of these names, (P, 2) [m]."""
+    # Takes long to import, and is of the few who draw a map.
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = []
+    for problem in problems:
+        frame = problem.follows.items[0].chain.base_placement
+        path = problem.path.samples(spread_along(problem.path, _OUTLINED)).translation
+        points.append((path @ frame.rotation.T + frame.translation)[:, :2])
+        for body in (item for one in problem.requirements for item in one.obstacles):
+            if body.name in bodies:
+                solid = Solid(body.geometry(), body.label)
+                corners = np.array(list(product(*zip(solid.low, solid.high, strict=True))))
+                points.append((corners @ body.pose.rotation.T + body.pose.translation)[:, :2])
+    every = np.concatenate(points)
+    try:
+        return np.asarray(every[ConvexHull(every).vertices])
+    except QhullError:
+        # A straight seam alone has no width.
+        return every
 
 
 def _middle(problems: Sequence[Problem]) -> Array:

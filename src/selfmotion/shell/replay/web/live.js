@@ -4,6 +4,8 @@ const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to a joint 
 // How the server ends a connection: without the token, and where another tab has the page.
 const REFUSED = 4403;
 const TAKEN = 4409;
+// The node of the places in reach.
+const FLOOR = "/selfmotion/floor";
 // A slider has so many steps.
 const STEPS = 400;
 
@@ -22,6 +24,8 @@ class Live {
     get("save").title = `Writes ${saves}`;
     for (const [value, name] of exports) element(get("export"), "option", { value }, name);
     if (!saves) this.say(why);
+    get("export").parentElement.hidden = exports.length === 0;
+    get("second").hidden = page.content.plans[0].steps.length > 0;
     if (page.stage) {
       this.handles = new Handles(page.stage, page.content.radius,
         (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
@@ -29,6 +33,8 @@ class Live {
     get("undo").addEventListener("click", () => this.ask({ do: "undo" }));
     get("save").addEventListener("click", () => this.ask({ do: "save" }));
     get("export").addEventListener("change", () => this.export());
+    get("second").addEventListener("click", () => (this.beside ? this.compare() : get("secondfile").click()));
+    get("secondfile").addEventListener("change", ({ target }) => { if (target.files.length) this.compare(target.files[0]); });
     get("turns").addEventListener("click", () => this.handles?.setTurns(!this.handles.turns) ?? this.drawTurns());
     get("letgo").addEventListener("click", () => this.handles?.choose(undefined));
     window.addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
@@ -104,11 +110,14 @@ class Live {
     this.state(message);
     if (plans) {
       this.handles?.settle();
+      page.content.columns = message.beside ? ["this one", message.beside] : undefined;
+      this.drawBeside(message.beside);
       page.replace(message);
       this.handles?.update(handles);
       this.drawHandles(handles);
       if (coarse) this.handles?.carry();
     }
+    this.drawFloor(this.handles?.gripped ? message.floor : undefined);
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
     if (brief) get("maps").classList.add("stale");
@@ -130,14 +139,38 @@ class Live {
       : message.kind === "early" ? "early" : "verified";
   }
 
+  // Where else what is dragged could stand: green on the ground.
+  drawFloor(floor) {
+    const { stage, content } = this.page;
+    stage?.viewer.remove(FLOOR);
+    get("green").hidden = !floor;
+    if (!stage || !floor) return;
+    const { places, size } = floor, high = content.ground + 0.002 * content.radius;
+    const vertices = [], triangles = [];
+    for (let k = 0; k < places.length; k += 2) {
+      for (const [x, y] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+        vertices.push(places[k] + 0.46 * x * size, places[k + 1] + 0.46 * y * size, high);
+      }
+      triangles.push(...[0, 1, 2, 0, 2, 3].map((corner) => 2 * k + corner));
+    }
+    const squares = new THREE.Mesh(
+      surface({ vertices: new Float32Array(vertices), triangles: new Uint32Array(triangles) }),
+      new THREE.MeshBasicMaterial({ color: 0x2ea043, transparent: true, opacity: 0.35, depthWrite: false }));
+    stage.find(FLOOR).add(squares);
+    stage.viewer.draw();
+  }
+
   drawNumbers(table) {
     if (!table) return;
     const rows = table.filter(({ label }) => TOLD.includes(label) || label.startsWith("closest to"));
     get("figures").replaceChildren();
-    for (const { label, cells: [[value, note]] } of rows) {
+    const columns = this.page.content.columns ?? [""];
+    get("figures").style.gridTemplateColumns = `auto${" auto".repeat(columns.length)}`;
+    if (columns.length > 1) for (const name of ["", ...columns]) element(get("figures"), "dt", {}, name);
+    for (const { label, cells } of rows) {
       element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
       // Where and when is in the table below: here the numbers leave room for the map.
-      element(get("figures"), "dd", note ? { title: note } : {}, value);
+      for (const [value, note] of cells) element(get("figures"), "dd", note ? { title: note } : {}, value);
     }
   }
 
@@ -179,7 +212,7 @@ class Live {
       // What was slid since then is newer than what is told.
       if (this.asked !== this.answered) continue;
       known.input.value = place(slider, slider.value);
-      known.output.textContent = number(slider.value, slider.unit);
+      if (document.activeElement !== known.typed) known.typed.value = number(slider.value);
     }
   }
 
@@ -192,16 +225,40 @@ class Live {
       element(line, "span", {}, slider.name);
       const input = element(line, "input", {
         type: "range", min: 0, max: STEPS, step: 1, "data-slider": slider.name, "aria-label": slider.name });
-      const output = element(line, "output", {});
-      const slide = (final) => {
-        const value = at(slider, Number(input.value));
-        output.textContent = number(value, slider.unit);
-        this.ask({ do: "slide", name: slider.name, value, final });
+      // A number that is known is typed.
+      const typed = element(line, "input", {
+        type: "number", step: "any", min: slider.low, max: slider.high, "data-typed": slider.name, "aria-label": `${slider.name}, as a number` });
+      element(line, "span", { class: "unit" }, slider.unit);
+      const slide = (value, final) => this.ask({ do: "slide", name: slider.name, value, final });
+      const slid = (final) => {
+        typed.value = number(at(slider, Number(input.value)));
+        slide(at(slider, Number(input.value)), final);
       };
-      input.addEventListener("input", () => slide(false));
-      input.addEventListener("change", () => slide(true));
-      this.sliders.set(slider.name, { slider, input, output });
+      input.addEventListener("input", () => slid(false));
+      input.addEventListener("change", () => slid(true));
+      typed.addEventListener("change", () => { if (typed.value !== "") slide(Number(typed.value), true); });
+      this.sliders.set(slider.name, { slider, input, typed });
     }
+  }
+
+  // Show the plan of a file beside the own one; without a file none.
+  async compare(file) {
+    const address = `/beside?name=${encodeURIComponent(file?.name ?? "")}&token=${encodeURIComponent(this.token)}`;
+    const answer = await fetch(address, { method: "POST", body: file ?? "" });
+    get("secondfile").value = "";
+    this.say(answer.ok ? "" : await answer.text(), !answer.ok);
+  }
+
+  // Another plan takes the place of the minimum-norm motion as the ghost of this one.
+  drawBeside(beside) {
+    const { page } = this;
+    if (beside === (this.beside ?? "")) return;
+    this.beside = beside;
+    get("second").textContent = beside ? `Without ${beside}` : "Compare …";
+    const box = get("layer-ghost");
+    if (!box) return;
+    box.nextSibling.textContent = beside || page.content.layers.find(({ name }) => name === "ghost").label;
+    page.setLayer("ghost", beside !== "");
   }
 
   async export() {
@@ -233,6 +290,6 @@ function at({ low, high, even }, step) {
   return Math.min(Math.max(Number(value.toPrecision(3)), low), high);
 }
 
-function number(value, unit) {
-  return `${Number(value.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
+function number(value) {
+  return String(Number(value.toPrecision(3)));
 }

@@ -62,7 +62,7 @@ class RedundancyMap extends Figure {
     const along = this.slice && this.choices > 1 ? "" : `: ${this.label}`;
     element(this.caption, "span", {}, `Redundancy map${of}${along} [${this.unit}]`);
     element(this.caption, "span", { class: "at" }, `${this.slice ? "a slice; " : ""}click: stand there`);
-    const frame = element(this.figure, "div", { class: "frame" });
+    const frame = this.frame = element(this.figure, "div", { class: "frame" });
     this.canvas = element(frame, "canvas", { width: this.t.length, height: this.values.length });
     this.svg = element(frame, "svg", { role: "img", "aria-label": `What stops the arm, by time and ${this.label}` });
     this.said = element(this.figure, "output", { class: "said" });
@@ -107,9 +107,9 @@ class RedundancyMap extends Figure {
   }
 
   draw() {
-    const width = Math.max(this.svg.clientWidth, 200);
+    const width = Math.max(this.svg.clientWidth, 200), height = this.frame.clientHeight || MAP_HEIGHT;
     const { left, right, top, bottom } = MARGIN;
-    const wide = width - left - right, high = MAP_HEIGHT - top - bottom;
+    const wide = width - left - right, high = height - top - bottom;
     const end = this.t[this.t.length - 1], count = this.values.length;
     const low = this.values[0], step = (this.values[count - 1] - low) / (count - 1);
     // Half a pixel beyond the first and the last one, in both directions.
@@ -119,13 +119,13 @@ class RedundancyMap extends Figure {
     this.inverse = (x, y) => [
       Math.floor(((x - left) / wide) * this.t.length), Math.floor(((top + high - y) / high) * count)];
     Object.assign(this.canvas.style, { left: `${left}px`, top: `${top}px`, width: `${wide}px`, height: `${high}px` });
-    this.svg.setAttribute("viewBox", `0 0 ${width} ${MAP_HEIGHT}`);
+    this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.replaceChildren();
     for (const place of ticks(low, this.values[count - 1], 8)) {
       element(this.svg, "text", { x: left - 6, y: this.y(place) + 4, "text-anchor": "end" }, String(Number(place.toPrecision(6))));
     }
     for (const time of ticks(0, end, Math.max(3, width / 110))) {
-      element(this.svg, "text", { x: this.x(time), y: MAP_HEIGHT - bottom + 15, "text-anchor": "middle" },
+      element(this.svg, "text", { x: this.x(time), y: height - bottom + 15, "text-anchor": "middle" },
         `${Number(time.toPrecision(6))} s`);
     }
     element(element(this.svg, "clipPath", { id: "clip-map" }), "rect", { x: left, y: top, width: wide, height: high });
@@ -157,6 +157,8 @@ class RedundancyMap extends Figure {
     if (this.cause[at] !== NO_CAUSE) return `${place}: ${this.causes[this.cause[at]]}`;
     if (!this.hasCost) return `${place}: allowed`;
     const above = (this.excess[at] / 255) * this.high;
+    // Less than a thousandth is what sums leave, and no price.
+    if (above < 1e-3 * this.least[i]) return `${place}: allowed, cost ${format(this.least[i])} per s, the least then`;
     const most = this.capped && this.excess[at] === 255 ? "at least " : "";
     return `${place}: allowed, cost ${format(this.least[i] + above)} per s, ${most}${format(above)} above the least then`;
   }

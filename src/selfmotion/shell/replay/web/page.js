@@ -467,7 +467,8 @@ class Page {
     const table = element(element(get("numbers"), "div", { class: "wide" }), "table");
     const head = element(element(table, "thead"), "tr");
     element(head, "td");
-    this.content.plans.forEach((plan, k) => element(head, "th", { scope: "col", "data-plan": k }, plan.label));
+    const columns = this.content.columns ?? this.content.plans.map(({ label }) => label);
+    columns.forEach((label, k) => element(head, "th", { scope: "col", "data-plan": k }, label));
     const body = element(table, "tbody");
     for (const { label, cells } of this.content.table) {
       const row = element(body, "tr");

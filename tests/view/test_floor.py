@@ -1,0 +1,52 @@
+"""Places in reach: those where other inverse kinematics finds the path, and no others."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.model.path import spread_along
+from selfmotion.model.task import SE3
+from selfmotion.shell.view.floor import floor_of
+from selfmotion.shell.view.handles import handles_of
+from support.views import CIRCLE
+
+# So many places in reach, and out of it, are looked at by other code, with so many starts.
+GREEN, OTHERS, STARTS = 5, 2, 30
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory):
+    file = tmp_path_factory.mktemp("floor") / "circle.toml"
+    file.write_text(CIRCLE)
+    return sm.files.read_job(file).problem
+
+
+def in_reach(problem, by):
+    """Whether the poses of a path displaced by (2,) are found one by one."""
+    for time in spread_along(problem.path, 12):
+        pose = problem.path.pose(time)
+        moved = SE3(pose.rotation, pose.translation + np.append(by, 0.0))
+        try:
+            problem.robot.inverse_kinematics(moved, problem.task, attempts=STARTS)
+        except sm.errors.InverseKinematicsError:
+            return False
+    return True
+
+
+@pytest.mark.parametrize(("name", "way"), [("path", 1.0), ("base", -1.0)])
+def test_places_are_green_where_the_path_is_in_reach(problem, name, way):
+    handle = handles_of(tomllib.loads(CIRCLE), problem)[name]
+    found = floor_of([problem], [problem.robot.home[None]], handle)
+    here = (handle.prefix * handle.pose).translation[:2]
+    for reached, count in ((True, GREEN), (False, OTHERS)):
+        places = found.places[found.reached == reached]
+        for place in places[:: len(places) // count]:
+            assert in_reach(problem, way * (place - here)) == reached
+
+
+def test_what_is_no_place_of_the_path_has_no_floor(problem):
+    handles = handles_of(tomllib.loads(CIRCLE), problem)
+    for name in ("post", "tool"):
+        assert floor_of([problem], [problem.robot.home[None]], handles[name]) is None
