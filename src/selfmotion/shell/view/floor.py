@@ -64,7 +64,7 @@ def floor_of(problems: Sequence[Problem], near: Sequence[Array], handle: Handle)
     is_moved = handle.kind in _DRAGGED and handle.joint < 0
     if not is_moved or any(chain.carrier >= 0 for chain in chains):
         return None
-    if not all(len(p.follows.items) == 1 and is_plain(p.follows) for p in problems):
+    if not all(is_plain(problem.follows) for problem in problems):
         return None
     # From the arm to the middle of the paths; all that is farther than the arm reaches is left out.
     middles = [
