@@ -53,3 +53,23 @@ def test_what_is_no_place_of_the_path_has_no_floor(problem):
     handles = handles_of(tomllib.loads(CIRCLE), problem)
     for name in ("post", "tool"):
         assert not Floor.can_move([problem], handles[name])
+
+
+def test_of_several_paths_all_have_to_be_in_reach(problem):
+    """And where one is so far away that it never is, nothing is green."""
+    handle = handles_of(tomllib.loads(CIRCLE), problem)["path"]
+    home = problem.robot.home[None]
+
+    def green(*problems):
+        found = Floor(problems, [home] * len(problems), handle)
+        while not found.is_done:
+            found.look()
+        return found.reached
+
+    up = SE3(np.eye(3), np.array([0.0, 0.0, 0.25]))
+    far = SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))
+    lifted = problem.changed(path=sm.paths.Placed(problem.path, up))
+    away = problem.changed(path=sm.paths.Placed(problem.path, far))
+    # Both have the same middle over the ground, and so the same places.
+    np.testing.assert_array_equal(green(problem, lifted), green(problem) & green(lifted))
+    assert not green(away, problem).any()

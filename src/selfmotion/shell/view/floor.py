@@ -97,6 +97,8 @@ class Floor:
         reached = np.ones(len(moved), dtype=bool)
         count = max(_POSES // len(self._problems), _FEWEST)
         for problem, motion in zip(self._problems, self._near, strict=True):
+            if not reached.any():
+                break
             reached[reached] = _reached(problem, motion, moved[reached], count)
         self.reached[here] = reached
 
