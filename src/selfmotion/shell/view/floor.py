@@ -59,7 +59,7 @@ class Floor:
             for problem in problems
         ]
         middle = np.mean(middles, axis=0)[:2]
-        arm = robot.joint_poses(robot.home[None])[0, 0, :2]
+        arm = robot.joint_poses(self._near[0][:1, : robot.dof])[0, 0, :2]
         self.size = _APART * robot.reach
         steps = self.size * np.arange(-_FAR, _FAR + 1)
         by = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
