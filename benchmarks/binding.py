@@ -105,7 +105,7 @@ def beside(number: int, deep: bool) -> Pair | None:
         met, away = bodies.worst(q).value, bodies.worst(free.given_start[None]).value
         if low < met < high and away > AWAY:
             clearance = sm.constraints.Clearance((ball,), DISTANCE)
-            return free, replace(free, constraints=[*free.constraints, clearance])
+            return free, replace(free, clearance=clearance)
     return None
 
 
@@ -115,7 +115,7 @@ def off_itself(number: int) -> Pair | None:
     if planned(free) is None:
         return None
     asked = sm.constraints.Clearance((), 0.0)
-    return free, replace(free, constraints=[*free.constraints, asked])
+    return free, replace(free, clearance=asked)
 
 
 KINDS: dict[str, Callable[[int], Pair | None]] = {

@@ -98,7 +98,7 @@ def near_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]]) -
             continue
         try:
             clear = sm.constraints.Clearance([body], CLEARANCE)
-            plan = sm.plan(bare.changed(constraints=[*limits, clear]), deadline=2.0)
+            plan = sm.plan(bare.changed(constraints=limits, clearance=clear), deadline=2.0)
         except sm.SelfmotionError:
             continue
         if plan.certificate.verified:
@@ -152,7 +152,7 @@ def best_with_copies(first: sm.Plan, other: sm.Plan, t: np.ndarray) -> float:
             for body in first.obstacles
         ]
         also = sm.constraints.Clearance(copies, 0.0)
-        there = problem.changed(constraints=(*problem.constraints, also))
+        there = problem.changed(clearance=[*problem.clearances, also])
         plan = sm.plan(there, warm_start=plan, deadline=20.0)
         if not plan.certificate.verified:
             break

@@ -30,6 +30,7 @@ from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import MinimumNormMotion, Objective, converged_minimum_norm
+from selfmotion.problem.constraints import NO_OVERLAP, said_once
 from selfmotion.problem.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
@@ -100,6 +101,7 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
     else:
         raise RuntimeError(f"problem {number} of seed {seed}: no constraints that bind were found")
     start = None if number % FREE == FREE - 1 else free.given_start
+    others, apart = said_once(constraints, NO_OVERLAP)
     return sm.Problem(
         robot,
         free.path,
@@ -107,7 +109,8 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
         start,
         free.null_motion,
         costs=free.costs,
-        constraints=constraints,
+        constraints=others,
+        clearance=apart,
         rest=False,
     )
 

@@ -109,13 +109,13 @@ def main(
     constraints = (
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
-        sm.constraints.Clearance((), 1e-3),
     )
+    apart = sm.constraints.Clearance((), 1e-3)
     for number in track(range(seed, seed + count), "paths", console=console, transient=True):
         kind, path = reachable_path(robot, np.random.default_rng(number))
         began = time.perf_counter()
         try:
-            problem = sm.Problem(robot, path, constraints=constraints)
+            problem = sm.Problem(robot, path, constraints=constraints, clearance=apart)
             plan = sm.plan(problem)
         except sm.SelfmotionError as error:
             outcomes["no plan"] += 1

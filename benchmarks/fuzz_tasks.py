@@ -62,8 +62,8 @@ def problem_of(
     constraints = [
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
-        sm.constraints.Clearance(obstacles, CLEARANCE),
     ]
+    apart = sm.constraints.Clearance(obstacles, CLEARANCE)
     criteria = {
         "position_m": POSITION,
         "rotation_deg": np.degrees(ROTATION) if task == "pointing" else np.inf,
@@ -73,7 +73,7 @@ def problem_of(
     places = [(size, pin.SE3(np.eye(3), centre)) for centre, size in boxes]
     left_out = {frozenset(pair) for pair in robot.touching}
     judge = SuiteJudge(robot, places, left_out, criteria, "z" if task == "pointing" else None)
-    return sm.Problem(robot, path, task, constraints=constraints), judge
+    return sm.Problem(robot, path, task, constraints=constraints, clearance=apart), judge
 
 
 def refusal(plan: sm.Plan, judge: SuiteJudge) -> str:

@@ -146,7 +146,7 @@ def job(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
 
 def batch(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
     """Return the verdicts of a batch that is begun in a folder, and its motions' digests."""
-    apart = [sm.constraints.Clearance([sm.obstacles.Mesh("part", np.zeros(3), str(mesh))], 0.005)]
+    apart = sm.constraints.Clearance([sm.obstacles.Mesh("part", np.zeros(3), str(mesh))], 0.005)
     problems = [
         sm.Problem(
             PANDA,
@@ -155,7 +155,8 @@ def batch(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
             ),
             "pointing",
             start=PANDA.inverse_kinematics(SE3(DOWN, np.array([0.4, y, 0.3])), "pointing", HOME),
-            constraints=apart,
+            constraints=(),
+            clearance=apart,
         )
         for y in (shift, shift - 0.15)
     ]

@@ -90,7 +90,7 @@ def main() -> int:
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
     ]
-    limits.append(sm.constraints.Clearance(distance=0.0, disabled=made))
+    apart = sm.constraints.Clearance(distance=0.0, disabled=made)
     found, seconds = 0, []
     for number in range(count):
         known = known_motion(robot, model, number)
@@ -98,7 +98,8 @@ def main() -> int:
         path = sm.paths.Waypoints.from_poses(np.linspace(0.0, DURATION, WAYPOINTS), poses)
         began = time.process_time()
         try:
-            plan = sm.plan(sm.Problem(robot, path, constraints=limits, rest=False))
+            problem = sm.Problem(robot, path, constraints=limits, clearance=apart, rest=False)
+            plan = sm.plan(problem)
             good, said = plan.certificate.verified, plan.certificate.verdict
             way = f"{length_of(plan.trajectory.q[:, lift]):.3f} m"
         except sm.SelfmotionError as error:

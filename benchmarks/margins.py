@@ -76,8 +76,8 @@ def random_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]])
             constraints=[
                 sm.constraints.JointPositionLimits(),
                 sm.constraints.JointVelocityLimits(),
-                sm.constraints.Clearance(bodies, float(rng.uniform(2e-3, 2e-2))),
             ],
+            clearance=sm.constraints.Clearance(bodies, float(rng.uniform(2e-3, 2e-2))),
         )
         plan = sm.plan(problem, deadline=2.0)
     except sm.SelfmotionError:

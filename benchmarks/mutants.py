@@ -97,7 +97,10 @@ PARTS = (
     Part(
         "charts",
         ("planning/nodes/charts.py", "planning/nodes/motion.py", "planning/nodes/spline.py"),
-        ("nodes/test_charts.py", "nodes/test_motion.py", "nodes/test_newton.py"),
+        (
+            *("nodes/test_spline.py", "nodes/test_charts.py", "nodes/test_motion.py"),
+            *("nodes/test_objective.py", "nodes/test_newton.py"),
+        ),
     ),
     Part(
         "rows",
@@ -124,6 +127,7 @@ PARTS = (
             "planning/nodes/batch.py",
         ),
         (
+            "nodes/test_newton_steps.py",
             "nodes/test_newton.py",
             "nodes/test_batch.py",
             "constraints/test_limits.py",

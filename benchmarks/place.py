@@ -56,7 +56,7 @@ def random_seams(rng: np.random.Generator, arm: int, count: int) -> list[sm.Prob
             for end, sign in zip(ends, (-1.0, 1.0), strict=True):
                 end.translation = pose.translation + middle + sign * way
             seam = sm.paths.Line(*ends, float(rng.uniform(3.0, 6.0)))
-            problem = sm.Problem(robot, seam, task, constraints=[*limits, clear])
+            problem = sm.Problem(robot, seam, task, constraints=limits, clearance=clear)
             try:
                 if sm.plan(problem, deadline=2.0).certificate.verified:
                     found.append(problem)

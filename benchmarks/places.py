@@ -23,6 +23,7 @@ from rich.progress import track
 
 import selfmotion as sm
 from selfmotion.basics import write_csv
+from selfmotion.problem.constraints import NO_OVERLAP
 
 ARMS = (("panda", "pose"), ("xarm7", "pointing"), ("ur5", "pointing"))
 # Distances of the seam's middle from the arm's axis, in shares of its reach, and heights [m].
@@ -101,8 +102,9 @@ def place(number: int) -> sm.Problem:
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
     ]
+    apart = NO_OVERLAP
     if number // 6 % 2:
-        constraints.append(sm.constraints.Clearance(bodies(part, rng), CLEARANCE))
+        apart = sm.constraints.Clearance(bodies(part, rng), CLEARANCE)
     relaxed = number // 3 % 2
     relaxations = [
         sm.Relaxation(("rx", "ry"), float(CONE)),
@@ -113,6 +115,7 @@ def place(number: int) -> sm.Problem:
         path,
         task,
         constraints=constraints,
+        clearance=apart,
         relaxations=relaxations if relaxed else (),
     )
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 import selfmotion as sm
+from selfmotion.problem.constraints import NO_OVERLAP
 
 
 def random_problem(robot: sm.RobotModel, rng: np.random.Generator) -> sm.Problem:
@@ -41,11 +42,10 @@ def random_problem(robot: sm.RobotModel, rng: np.random.Generator) -> sm.Problem
             poses.append(there)
         waypoints = sm.paths.Waypoints.from_poses(np.linspace(0.0, seconds, 6), poses)
         path = sm.paths.section_at_rest(waypoints, ramp=0.5)
+    apart = NO_OVERLAP
     if rng.random() < 0.3:
         away = rng.normal(size=3)
         box = pose.translation + 0.35 * away / np.linalg.norm(away)
-        constraints.append(
-            sm.constraints.Clearance(sm.obstacles.Box("box", box, [0.1, 0.1, 0.1]), 0.01)
-        )
+        apart = sm.constraints.Clearance(sm.obstacles.Box("box", box, [0.1, 0.1, 0.1]), 0.01)
     start = q if rng.random() < 0.5 else None
-    return sm.Problem(robot, path, "pose", start, constraints=constraints)
+    return sm.Problem(robot, path, "pose", start, constraints=constraints, clearance=apart)

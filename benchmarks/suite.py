@@ -22,6 +22,7 @@ from suite_judge import Judged, SuiteJudge
 
 import selfmotion as sm
 from selfmotion.basics import Array, Progress, write_atomically, write_csv
+from selfmotion.problem.constraints import NO_OVERLAP
 from selfmotion.shell.cli.tables import console
 
 DATA = Path(__file__).parent / "data"
@@ -155,10 +156,9 @@ def plan(
         sm.constraints.JointPositionLimits(robot.lower + EDGE, robot.upper - EDGE),
         sm.constraints.JointVelocityLimits(largest / (slower * step)),
     ]
+    apart = NO_OVERLAP
     if criteria["collision_free"]:
-        constraints.append(
-            sm.constraints.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled)
-        )
+        apart = sm.constraints.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled)
     weights = [metre if robot.is_prismatic(name) else 1.0 for name in robot.joint_names]
     length = sm.costs.PathLength(smoothing=0.005 / slower, joint_weights=weights)
     asked = sm.Problem(
@@ -167,6 +167,7 @@ def plan(
         problem.task,
         costs=[length],
         constraints=constraints,
+        clearance=apart,
     )
     found = sm.plan(
         asked,

@@ -35,7 +35,8 @@ problem = sm.Problem(
     circle,
     task="position",
     start=home,
-    constraints=[*limits, sm.constraints.Clearance([cone], distance=0.01)],
+    constraints=limits,
+    clearance=sm.constraints.Clearance([cone], distance=0.01),
 )
 plan = sm.plan(problem).require()
 print(f"with it: {plan.certificate.verdict}")

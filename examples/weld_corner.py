@@ -29,11 +29,8 @@ problem = sm.Problem(
     panda,
     seam,
     task="pointing",
-    constraints=[
-        sm.constraints.JointPositionLimits(),
-        sm.constraints.JointVelocityLimits(),
-        sm.constraints.Clearance([frame, torch], distance=2e-3),
-    ],
+    constraints=[sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()],
+    clearance=sm.constraints.Clearance([frame, torch], distance=2e-3),
 )
 plan = sm.plan(problem).require()
 print(f"cost {plan.report.initial_cost:.4f} → {plan.report.cost:.4f}")

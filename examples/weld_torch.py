@@ -46,8 +46,8 @@ problem = sm.Problem(
         sm.constraints.JointVelocityLimits(),
         # The wire points downwards within 50 degrees: the weld pool stays where it is.
         sm.constraints.Tilt("arm/tool0_offset", "z", within=np.radians(50.0)),
-        sm.constraints.Clearance(part, distance=2e-3),
     ],
+    clearance=sm.constraints.Clearance(part, distance=2e-3),
 )
 plan = sm.plan(problem).require()
 print(f"cost {plan.report.initial_cost:.4f} → {plan.report.cost:.4f}")

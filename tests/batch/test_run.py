@@ -416,7 +416,8 @@ def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> N
             line,
             "position",
             PANDA_HOME,
-            constraints=[sm.constraints.Clearance(bodies, 0.01)],
+            constraints=[],
+            clearance=sm.constraints.Clearance(bodies, 0.01),
         )
         found = sm.work.batch.plan_many([problem], InPlace(), out=out)
         return found.rows[0], found.resumed

@@ -309,8 +309,7 @@ def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
     plan.save(tmp_path / "plan.npz")
     (tmp_path / "one.srdf").write_text(srdf_without(sm.obstacles.CollisionModel(robot).pairs))
     again = sm.load_plan(tmp_path / "plan.npz")
-    assert again.problem.clearance is not None
-    assert again.problem.clearance.disabled == (pair,)
+    assert [item.disabled for item in again.problem.clearances] == [(pair,)]
     assert again.certificate.remarks == plan.certificate.remarks
 
 
@@ -362,7 +361,9 @@ def near_bodies(panda: sm.RobotModel) -> sm.Plan:
     ]
     line = short_line(panda, start)
     return sm.plan(
-        sm.Problem(panda, line, start=start, constraints=[sm.constraints.Clearance(bodies)])
+        sm.Problem(
+            panda, line, start=start, constraints=[], clearance=sm.constraints.Clearance(bodies)
+        )
     )
 
 
@@ -370,7 +371,7 @@ def test_the_closest_approach_of_each_obstacle_is_that_of_dense_samples(
     panda: sm.RobotModel,
 ) -> None:
     plan = near_bodies(panda)
-    model = plan.problem.constraints[-1].model(panda)
+    model = plan.problem.clearances[0].model(panda)
     times = np.linspace(plan.trajectory.t[0], plan.trajectory.t[-1], 400)
     values = model.distances(plan.trajectory(times))
     groups = {

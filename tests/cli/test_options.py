@@ -77,7 +77,7 @@ def test_obstacles_pairs_and_locks(tmp_path: Path) -> None:
         tmp_path, "--obstacles", cell, "--clearance", "0.01", "--srdf", tmp_path / "arm.srdf",
         "--lock", "panda_finger_joint1=0.03", "--tool", "panda_hand",
     )  # fmt: skip
-    (clearance,) = (item for item in kinds(plan) if item["kind"] == "Clearance")
+    (clearance,) = (item.to_dict() for item in plan.problem.clearances)
     assert clearance["distance"] == 0.01
     assert clearance["disabled"] == [["panda_link5", "panda_link7"]]
     assert clearance["obstacles"][0]["size"] == pytest.approx([0.1, 0.2, 1.0])

@@ -130,7 +130,7 @@ def test_where_no_motion_was_found_past_an_obstacle_it_is_said_with_what_may_hel
     )
     far = sm.obstacles.Box("post", [3.0, 0.0, 0.0], [0.1, 0.1, 0.1])
     held = sm.constraints.Clearance([far], 0.005)
-    problem = sm.Problem(ur5, line, "pointing", "free", constraints=[held])
+    problem = sm.Problem(ur5, line, "pointing", "free", constraints=[], clearance=held)
     made = sm.plan(problem, search=sm.Search(starts=2, finalists=1))
     assert not blocked_text(made)
     findings = [
@@ -158,7 +158,7 @@ def test_a_clearance_that_a_pose_has_is_told_where_it_has_not_the_one_that_was_a
     line = sm.paths.Line(begin, end, 10.0)
     held = sm.constraints.Clearance([POST], 0.03)
     with pytest.raises(sm.SelfmotionError, match=r"what would help: .*a clearance of ") as error:
-        sm.plan(sm.Problem(panda, line, "pose", "free", constraints=[held]))
+        sm.plan(sm.Problem(panda, line, "pose", "free", constraints=[], clearance=held))
     told = re.search(r"a clearance of ([0-9.]+) mm", str(error.value))
     apart = re.search(r"are ([0-9.]+) mm apart \(wanted: 30 mm\)", str(error.value))
     assert told is not None

@@ -308,7 +308,14 @@ def test_a_plan_with_what_rides_is_that_of_the_arm_with_the_link(
     line = short_line(panda, start)
     plans = [
         sm.plan(
-            sm.Problem(arm, line, task, start, constraints=[sm.constraints.Clearance(bodies, 0.01)])
+            sm.Problem(
+                arm,
+                line,
+                task,
+                start,
+                constraints=[],
+                clearance=sm.constraints.Clearance(bodies, 0.01),
+            )
         )
         for arm, bodies in (
             (panda, [post, torch]),
@@ -433,7 +440,9 @@ def test_a_free_start_keeps_what_rides_clear(panda: sm.RobotModel) -> None:
     kept = sm.constraints.Clearance([rod, *walls], 0.005)
     assert kept.model(panda).distance(start).value < 0.0
     limits = sm.constraints.JointPositionLimits()
-    plan = sm.plan(sm.Problem(panda, line, "pointing", constraints=[limits, kept])).require()
+    plan = sm.plan(
+        sm.Problem(panda, line, "pointing", constraints=[limits], clearance=kept)
+    ).require()
     assert {"rod", "wall0", "wall1"} <= plan.approaches.keys()
     assert min(near.value for near in plan.approaches.values()) >= 0.005
 
@@ -445,7 +454,8 @@ def test_a_problem_file_carries_the_frame(panda: sm.RobotModel, tmp_path: Path) 
         panda,
         short_line(panda, start),
         start=start,
-        constraints=[sm.constraints.Clearance([torch])],
+        constraints=[],
+        clearance=sm.constraints.Clearance([torch]),
     )
     sm.files.write_problem(problem, tmp_path / "cell.toml")
     (found,) = sm.read_problem(tmp_path / "cell.toml").requirements[-1].obstacles

@@ -14,6 +14,7 @@ from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper.objective import node_tangents
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of
@@ -67,7 +68,7 @@ def objective_with(
 
 def rows_of(objective: Objective, bound: sm.constraints.BoundConstraint, x: Array) -> Array:
     """Return the derivatives of all conditions at x, as programmes ask for them."""
-    motion = objective.node_tangents(x)
+    motion = node_tangents(objective, x)
     known = linearised(bound, objective.samples(x), motion)
     return known.picked(motion, np.arange(known.count))
 
@@ -95,7 +96,7 @@ def test_tangents_equal_central_differences(constraint: str) -> None:
     made = CONSTRAINTS[constraint](robot_named("panda"))
     objective, bound = objective_with(made, "panda", "pose")
     x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
-    tangents: NodeTangents = objective.node_tangents(x)
+    tangents: NodeTangents = node_tangents(objective, x)
     exact = bound.tangents(objective.samples(x), tangents)
     for i in (0, 1, objective.size - 1):
         ends = []
@@ -115,7 +116,7 @@ def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
     objective, bound = objective_with(made, "panda", "pose")
     rng = np.random.default_rng(4)
     x = 0.02 * rng.normal(size=objective.size)
-    tangents, samples = objective.node_tangents(x), objective.samples(x)
+    tangents, samples = node_tangents(objective, x), objective.samples(x)
     expected = bound.tangents(samples, tangents).reshape(-1, objective.size)
     rows = linearised(bound, samples, tangents)
     # All of one motion is computed once.
@@ -203,12 +204,11 @@ def test_of_two_constraints_of_a_kind_both_are_judged(
 def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> None:
     path = short_line(panda, PANDA_HOME)
     box = sm.obstacles.Box("far", np.array([0.0, 0.0, 2.0]), [0.1, 0.1, 0.1])
-    constraints = (
-        *LIMITS,
-        sm.constraints.JointAccelerationLimits(20.0),
-        sm.constraints.Clearance((box,), 0.001),
+    constraints = (*LIMITS, sm.constraints.JointAccelerationLimits(20.0))
+    apart = sm.constraints.Clearance((box,), 0.001)
+    plan = sm.plan(
+        sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints, clearance=apart)
     )
-    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints))
     assert plan.certificate.verified
     plan.save(tmp_path / "plan.npz")
     loaded = sm.load_plan(tmp_path / "plan.npz")

@@ -1,11 +1,18 @@
 """Clearance: exact rows, kept on the real meshes, and no dearer than need be."""
 
+import json
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import read_archive, write_archive
+from selfmotion.planning.result.archive import file_digest
+from selfmotion.problem.constraints import NO_OVERLAP
+from selfmotion.problem.problem.digest import conditions_digest
 from support.arms import PANDA_HOME, short_line
 
 Circle = Callable[..., sm.Problem]
@@ -26,7 +33,8 @@ def test_obstacles_are_avoided_on_the_real_meshes(panda: sm.RobotModel) -> None:
         panda,
         path,
         start=PANDA_HOME,
-        constraints=(*LIMITS, clearance),
+        constraints=LIMITS,
+        clearance=clearance,
     )
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
@@ -41,12 +49,14 @@ def test_clearance_of_an_arm_without_geometry_is_refused(planar: sm.RobotModel) 
     with pytest.raises(
         sm.errors.ProblemError, match="planar_3r: a clearance is asked for, but its URDF"
     ):
-        sm.Problem(planar, path, "planar", start, constraints=[sm.constraints.Clearance()])
+        sm.Problem(
+            planar, path, "planar", start, constraints=[], clearance=sm.constraints.Clearance()
+        )
 
 
 def test_a_table_under_the_base_is_no_obstacle_to_it(panda_circle: Circle) -> None:
     table = sm.obstacles.Box("table", [0.0, 0.0, -0.05], [0.6, 0.6, 0.1])
-    problem = panda_circle(constraints=[sm.constraints.Clearance([table], 1e-3)])
+    problem = panda_circle(constraints=[], clearance=sm.constraints.Clearance([table], 1e-3))
     assert sm.plan(problem).certificate.verified
 
 
@@ -60,6 +70,76 @@ def test_passing_closer_than_capsules_allow_costs_nothing(panda_circle: Circle) 
         model = sm.obstacles.CollisionModel(free.robot, [box])
         if model.worst(free.trajectory.q).value > 0.01:
             break
-    plan = sm.plan(panda_circle(constraints=[sm.constraints.Clearance([box], 5e-3)]))
+    plan = sm.plan(panda_circle(constraints=[], clearance=sm.constraints.Clearance([box], 5e-3)))
     assert plan.certificate.verified
     assert plan.report.cost == pytest.approx(free.report.cost, rel=1e-3)
+
+
+def ball_beside(panda: sm.RobotModel) -> sm.obstacles.Obstacle:
+    """A ball beside the elbow, which the best motion meets."""
+    elbow = panda.chain_to("panda_link4").place(PANDA_HOME).translation
+    return sm.obstacles.Sphere("ball", elbow + np.array([0.0, -0.16, 0.05]), 0.05)
+
+
+def formerly(problem: Callable[..., sm.Problem], **given: Any) -> sm.Problem:
+    """Return a problem that has a clearance among its constraints, which warns what to write."""
+    with pytest.warns(sm.errors.FormerUseWarning, match=r"write \w+\(…, clearance=Clear"):
+        return problem(**given)
+
+
+def test_a_clearance_among_the_constraints_is_moved_and_plans_the_same(
+    panda: sm.RobotModel, panda_circle: Circle
+) -> None:
+    clear, plain = sm.constraints.Clearance([ball_beside(panda)], 5e-3), NO_OVERLAP
+    own = sm.constraints.Clearance((), 0.0)
+    for given, now in ((plain, clear), (None, clear), (own, (clear, own))):
+        former = formerly(panda_circle, constraints=(LIMITS[0], clear, LIMITS[1]), clearance=given)
+        asked = panda_circle(constraints=LIMITS, clearance=now)
+        assert former.constraints == LIMITS
+        assert former.clearance == now
+        assert former.digest == asked.digest
+    one, other = (sm.plan(each).require() for each in (former, asked))
+    assert one.report.cost == other.report.cost
+    assert one.certificate == other.certificate
+    moved = formerly(sm.move, robot=panda, first=PANDA_HOME, last=PANDA_HOME, constraints=[clear])
+    assert moved.constraints == (clear,)
+
+
+def test_all_of_several_clearances_are_kept(panda: sm.RobotModel, panda_circle: Circle) -> None:
+    near, far = (sm.constraints.Clearance([ball_beside(panda)], d) for d in (1e-3, 7e-3))
+    plan = sm.plan(panda_circle(constraints=LIMITS, clearance=[near, far])).require()
+    model = sm.obstacles.CollisionModel(panda, far.obstacles)
+    assert model.worst(plan.trajectory(np.linspace(0, 4, 301))).value >= far.distance
+    for wrong in (5, [near, 5], [[near]], "near"):
+        with pytest.raises(sm.errors.ProblemError, match=r"clearance is .*, expected a Clearance"):
+            panda_circle(clearance=wrong)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_files_with_a_clearance_among_the_constraints_are_read(
+    panda: sm.RobotModel, panda_circle: Circle, tmp_path: Path, place: int
+) -> None:
+    """Of former versions: plans verified as they are, problem files with a note."""
+    clear = sm.constraints.Clearance([ball_beside(panda)], 5e-3)
+    plan = sm.plan(panda_circle(constraints=LIMITS, clearance=clear)).require()
+    plan.save(tmp_path / "now.npz")
+    description, arrays = read_archive(tmp_path / "now.npz")
+    del description["digest"]
+    document = description["problem"]
+    document["constraints"].insert(place, document.pop("collision"))
+    order = [*LIMITS[:place], clear, *LIMITS[place:]]
+    description["certificate"]["problem"] = conditions_digest(plan.problem, order)
+    description["digest"] = file_digest(description, arrays)
+    write_archive(tmp_path / "former.npz", description, arrays)
+    again = sm.load_plan(tmp_path / "former.npz")
+    assert again.certificate == plan.certificate
+    assert again.check() == plan.certificate
+    again.save(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "now.npz").read_bytes()
+    sm.files.write_problem(plan.problem, tmp_path / "now.json")
+    table = json.loads((tmp_path / "now.json").read_text())
+    table["constraints"].insert(place, {"kind": "Clearance", **table.pop("clearance")})
+    (tmp_path / "former.json").write_text(json.dumps(table))
+    job = sm.files.read_job(tmp_path / "former.json")
+    assert any("give the table [clearance]" in note for note in job.notes)
+    assert job.problem.digest == plan.problem.digest

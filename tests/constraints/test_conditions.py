@@ -15,6 +15,7 @@ from selfmotion.planning.paper import Rollout
 from selfmotion.problem.constraints import (
     BoundConstraint,
     BoundLimits,
+    BoundQuantity,
     Conditions,
     Linear,
     Multipliers,
@@ -23,6 +24,7 @@ from selfmotion.problem.constraints import (
     linearised,
     penalty,
     violated,
+    worst_time,
 )
 from selfmotion.problem.costs import Samples
 from selfmotion.shell.testing import check_constraint
@@ -205,3 +207,61 @@ def test_a_constraint_that_is_wrong_on_demand_does_not_pass() -> None:
     problem = sm.Problem(robot, short_line(robot, start), Task.POSE, start, rest=False)
     with pytest.raises(AssertionError, match=r"linearised_at\(\) is .* off what tangents\(\) says"):
         check_constraint(Mine(0.02), problem)
+
+
+def quantity_of(limit: float, components: int) -> sm.certificate.Quantity:
+    """Return joint 1 with a limit, or the first joints as a vector."""
+    vector = components > 1
+
+    def values(q: Array, qd: Array, qdd: Array) -> Array:
+        return q[:, None, :components] if vector else q[:, :1]
+
+    def derivatives(q: Array, qd: Array, qdd: Array) -> tuple[Array]:
+        one = np.eye(q.shape[1])[:components]
+        return (np.tile(one[None] if vector else one, (len(q), *(1,) * (1 + vector))),)
+
+    columns = [sm.certificate.Column("it", "the place of it", "rad")]
+    return sm.certificate.Quantity(
+        "place", columns, values, derivatives, limit, components=components
+    )
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_half_the_margin_of_a_quantity_is_left_at_its_tolerance(
+    samples: Samples, components: int
+) -> None:
+    margin = 0.2
+    q = samples.q[samples.nodes]
+    size = np.abs(q[:, 0]) if components == 1 else np.linalg.norm(q[:, :components], axis=1)
+    row = int(np.argmax(size))
+    # Its largest value uses all but half of the margin.
+    limit = float(size[row]) / (1.0 - 0.5 * margin)
+    bound = BoundQuantity(quantity_of(limit, components), margin)
+    assert bound.residual(samples).max() == pytest.approx(bound.tolerance)
+    # The words are of the value itself: a number with its sign, of a vector the length.
+    value = float(q[row, 0]) if components == 1 else float(size[row])
+    time = float(samples.sampling.node_times[row])
+    assert bound.describe(samples, row, 0) == bound.quantity.said(0, value, time)
+
+
+def test_the_worst_time_is_that_of_the_largest_violation(grid: Grid, samples: Samples) -> None:
+    less, more = table(grid), table(grid)
+    less[2, 0], more[7, 1] = 0.3, 0.4
+    several = [(Given("one", less), samples), (Given("two", more), samples)]
+    assert worst_time(several) == worst_time(several[::-1]) == grid.nodes[7]
+    assert worst_time(several[:1]) == grid.nodes[2]
+    # Not of equalities, nor of what is within its tolerance.
+    assert worst_time([(Given("end", more, equality=True), samples)]) is None
+    assert worst_time([(Given("kept", 1e-3 * less), samples)]) is None
+
+
+def test_tangents_of_some_rows_are_those_of_all(grid: Grid) -> None:
+    count = len(grid.nodes)
+    rng = np.random.default_rng(1)
+    motion = NodeTangents(*rng.normal(size=(2, count, 7, 3)), grid.sampling)
+    nodes, joints = np.array([0, 3, count - 1, 3]), np.array([6, 0, 2, 5])
+    for order in range(4):
+        every = motion.of_order(order)
+        assert every.shape == motion.q.shape
+        found = motion.picked(order, nodes, joints)
+        np.testing.assert_allclose(found, every[nodes, joints], atol=1e-9 * np.abs(every).max())

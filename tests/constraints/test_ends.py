@@ -1,6 +1,7 @@
 """Conditions on both ends: reached, closed, or refused."""
 
 import dataclasses
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import ClosedMotion, EndState
+from selfmotion.model.task import SE3
 from selfmotion.planning.paper.minimum_norm import FreeStart
-from support.arms import PANDA_HOME, short_line
+from support.arms import PANDA_HOME, short_line, start_of
 from support.followed import standing
 
 Circle = Callable[..., sm.Problem]
@@ -142,3 +144,30 @@ def test_a_start_velocity_that_the_path_does_not_have_is_refused(
             posed()
     else:
         posed()
+
+
+def test_rates_at_ends_are_those_of_rest_where_nothing_else_is_said(panda: sm.RobotModel) -> None:
+    asked = sm.constraints
+    for kind in (
+        *(asked.StartVelocity, asked.EndVelocity, asked.StartAcceleration, asked.EndAcceleration),
+    ):
+        np.testing.assert_array_equal(kind().target(panda), np.zeros(panda.dof))
+
+
+@pytest.mark.parametrize(("row", "more"), [("x", 0.3), ("y", 0.4)])
+def test_a_start_velocity_is_refused_for_the_row_that_is_farthest_off(
+    planar: sm.RobotModel, row: str, more: float
+) -> None:
+    """Whatever the sizes of the rows: the path moves along x."""
+    start = start_of(planar, "planar")
+    first = planar.pose(start)
+    last = SE3(first.rotation, first.translation + np.array([0.2, 0.0, 0.0]))
+    path = sm.paths.Line(first, last, 2.0, time_law="constant")
+    tool = np.array([0.1, 0.0]) + more * np.array([row == "x", row == "y"])
+    joint_rates = np.linalg.pinv(planar.task_jacobian(start, "planar")) @ tool
+    told = f"moves 'tool' at {tool['xy'.index(row)]:g} m/s or rad/s in row 'v{row}', but the "
+    told += f"path begins at {0.1 if row == 'x' else 0.0:g};"
+    with pytest.raises(sm.errors.ProblemError, match=re.escape(told)):
+        sm.Problem(
+            planar, path, "planar", start, constraints=[sm.constraints.StartVelocity(joint_rates)]
+        )

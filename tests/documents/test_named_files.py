@@ -99,5 +99,5 @@ def test_a_mesh_is_the_same_body_in_a_file_elsewhere(
     clearance = sm.constraints.Clearance([part], 0.01)
     problem = sm.Problem(panda, circle, "position", PANDA_HOME, clearance=clearance)
     sm.files.write_problem(problem, "cells/cell.toml")
-    (body,) = sm.read_problem("cells/cell.toml").clearance.obstacles
+    (body,) = sm.read_problem("cells/cell.toml").clearances[0].obstacles
     assert Path(body.file).samefile("part.stl")

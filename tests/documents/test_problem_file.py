@@ -45,10 +45,10 @@ def test_a_file_says_what_python_says(job: sm.files.PlanRequest) -> None:
         start=PANDA_HOME,
         null_motion=sm.motion.FreeNullMotion(),
         costs=[sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.001)],
-        constraints=[
-            sm.constraints.JointPositionLimits(),
-            sm.constraints.Clearance([sm.obstacles.Box("post", turned, [0.1, 0.1, 1.2])], 0.01),
-        ],
+        constraints=[sm.constraints.JointPositionLimits()],
+        clearance=sm.constraints.Clearance(
+            [sm.obstacles.Box("post", turned, [0.1, 0.1, 1.2])], 0.01
+        ),
         relaxations=[sm.Relaxation(("rx", "ry"), np.pi / 36)],
     )
     said = sm.plan(problem, max_evaluations=50, tolerance=sm.Tolerance(position=1e-5))

@@ -62,7 +62,7 @@ def test_bodies_of_a_workpiece_and_of_a_tool_are_in_its_frame_by_default(tmp_pat
     box = '{ shape = "box", name = "web", size_mm = [9, 9, 9] }'
     held = '[[robot.bodies]]\nshape = "sphere"\nname = "tip"\nradius_mm = 5'
     found = problem(tmp_path, "line", 0.4, 9.0, bodies=f"obstacles = [{box}]", reference=held)
-    (body,) = found.clearance.obstacles
+    (body,) = found.clearances[0].obstacles
     np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 9.0).homogeneous, atol=1e-12)
     world = f'[[constraints]]\nkind = "Clearance"\nobstacles = [{box}]'
     with pytest.raises(sm.errors.FileFormatError, match=r"obstacles\[0\]\.position: is missing"):
@@ -76,7 +76,7 @@ def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path:
     for t in np.linspace(0.0, here.path.duration, 7):
         wanted = moved * here.path.pose(t)
         np.testing.assert_allclose(there.path.pose(t).homogeneous, wanted.homogeneous, atol=1e-12)
-    bodies = [item.clearance.obstacles for item in (here, there) if item.clearance is not None]
+    bodies = [item.clearances[0].obstacles for item in (here, there)]
     assert [body.name for body in bodies[0]] == ["clamp", "pin"]
     for one, other in zip(*bodies, strict=True):
         np.testing.assert_allclose(
@@ -88,20 +88,17 @@ def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path:
     np.testing.assert_allclose(
         again.path.pose(1.0).homogeneous, here.path.pose(1.0).homogeneous, atol=1e-12
     )
-    assert again.clearance is not None
-    for one, other in zip(bodies[0], again.clearance.obstacles, strict=True):
+    for one, other in zip(bodies[0], again.clearances[0].obstacles, strict=True):
         np.testing.assert_allclose(other.pose.homogeneous, one.pose.homogeneous, atol=1e-12)
 
 
 def test_bodies_join_the_clearance_that_there_is(tmp_path: Path) -> None:
     more = (
-        'constraints = [{ kind = "Clearance", distance_mm = 4, '
-        'obstacles = [{ shape = "sphere", name = "lamp", position = [0, 0, 2], radius = 0.1 }] }]'
+        "clearance = { distance_mm = 4, "
+        'obstacles = [{ shape = "sphere", name = "lamp", position = [0, 0, 2], radius = 0.1 }] }'
     )
     found = problem(tmp_path, "line", 0.4, 0.0, more=more)
-    (clearance,) = (
-        item for item in found.constraints if isinstance(item, sm.constraints.Clearance)
-    )
+    (clearance,) = found.clearances
     assert [body.name for body in clearance.obstacles] == ["lamp", "clamp", "pin"]
     assert clearance.distance == 0.004
     lamp = clearance.obstacles[0]
@@ -113,14 +110,12 @@ def test_meshes_stand_where_their_coordinates_say(tmp_path: Path) -> None:
 
     trimesh.creation.box((0.1, 0.05, 0.01)).export(tmp_path / "part.stl")
     mesh = '{ shape = "mesh", name = "part", file = "part.stl"PLACE }'
-    more = 'constraints = [{ kind = "Clearance", obstacles = [MESH] }]'
+    more = "clearance = { obstacles = [MESH] }"
     poses = []
     for place in ("", ", position = [0, 0, 0]"):
         text = more.replace("MESH", mesh.replace("PLACE", place))
         found = problem(tmp_path, "line", 0.4, 0.0, more=text)
-        (clearance,) = (
-            item for item in found.constraints if isinstance(item, sm.constraints.Clearance)
-        )
+        (clearance,) = found.clearances
         poses.append(clearance.obstacles[0].pose.homogeneous)
     np.testing.assert_array_equal(*poses)
     np.testing.assert_array_equal(poses[0], np.eye(4))
@@ -135,8 +130,7 @@ def test_its_mesh_is_a_body(tmp_path: Path) -> None:
     trimesh.creation.box((100.0, 50.0, 10.0)).export(tmp_path / "part.stl")
     mesh = 'mesh = "part.stl"\nscale = 0.001'
     found = problem(tmp_path, "line", 0.4, 0.0, bodies=mesh)
-    assert found.clearance is not None
-    (body,) = found.clearance.obstacles
+    (body,) = found.clearances[0].obstacles
     assert (body.name, body.file, body.scale) == ("workpiece", tmp_path / "part.stl", 0.001)
     np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 0.0).homogeneous, atol=1e-12)
 

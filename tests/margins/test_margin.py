@@ -36,8 +36,9 @@ def plan() -> sm.Plan:
         sm.obstacles.Cylinder("post", [tip[0], 0.25, tip[2]], 0.04, 0.3),
         sm.obstacles.Capsule("torch", [0.08, 0.0, 0.05], 0.01, 0.1, frame="panda_hand"),
     ]
-    constraints = [*LIMITS, sm.constraints.Clearance(bodies, 5e-3)]
-    return sm.plan(sm.Problem(robot, path, start=PANDA_HOME, constraints=constraints)).require()
+    clear = sm.constraints.Clearance(bodies, 5e-3)
+    problem = sm.Problem(robot, path, start=PANDA_HOME, constraints=LIMITS, clearance=clear)
+    return sm.plan(problem).require()
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +160,7 @@ def test_what_is_mounted_on_the_base_goes_with_it() -> None:
     )
     path = sm.paths.Circle.around(pose, 0.03, 2.0, normal=(1.0, 0.0, 0.0))
     clear = sm.constraints.Clearance([post], 1e-3)
-    problem = sm.Problem(robot, path, start=PANDA_HOME, constraints=[*LIMITS, clear])
+    problem = sm.Problem(robot, path, start=PANDA_HOME, constraints=LIMITS, clearance=clear)
     found = sm.margin(sm.plan(problem).require())
     assert "post" not in found.base.bodies
     assert "no contact" in found.base.translation.reason
@@ -185,7 +186,9 @@ def test_a_tool_that_stands_in_the_world_is_what_is_displaced() -> None:
     path = sm.paths.Circle.around(cell.pose(home), 0.02, 2.0, normal=(0.0, 0.0, 1.0))
     post = sm.obstacles.Cylinder("post", place.translation + np.array([0.2, 0.2, 0.1]), 0.03, 0.2)
     clear = sm.constraints.Clearance([post], 1e-3)
-    plan = sm.plan(sm.Problem(cell, path, start=home, constraints=[*LIMITS, clear])).require()
+    plan = sm.plan(
+        sm.Problem(cell, path, start=home, constraints=LIMITS, clearance=clear)
+    ).require()
     found = sm.margin(plan)
     assert found.tool.bodies == ("torch/tip",)
     assert "'torch/tip' meets 'arm/panda_" in found.tool.translation.stops
@@ -245,11 +248,10 @@ def test_of_a_program_margins_are_those_of_its_seams(plan: sm.Plan, tmp_path: Pa
         sm.load_plan(tmp_path / "a.program")
     problem = plan.problem
     seam = sm.Seam("one", problem.path, problem.task)
-    (clear,) = (x for x in problem.constraints if isinstance(x, sm.constraints.Clearance))
-    others = [x for x in problem.constraints if x is not clear]
+    (clear,) = problem.clearances
     start = plan.trajectory.q[0]
     program = sm.plan_job(
-        problem.robot, [seam], start=start, branches=1, constraints=others, clearance=clear
+        problem.robot, [seam], start=start, branches=1, constraints=LIMITS, clearance=clear
     )
     file = tmp_path / "a.program"
     program.save(file)

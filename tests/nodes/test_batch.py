@@ -6,7 +6,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes import Batch, NodeGrid, Step, minimise
+from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, Step, batch, minimise
+from selfmotion.planning.nodes.motion import stepped
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
 
@@ -129,3 +130,22 @@ def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
     np.testing.assert_allclose(
         advanced(some, 2).costs, advanced(found, 2).costs[[3, 1]], rtol=ROUNDING
     )
+
+
+def test_no_coordinate_changes_more_in_one_step_than_allowed(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = sm.costs.Posture(100.0, posture=PANDA_HOME + 1.5)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 4.0)
+    problem = problem_of((panda, "position", PANDA_HOME, path), costs=[far])
+    begin = Batch.near(grid_of(problem), motions_of(problem))
+    changes: list[float] = []
+
+    def seen(motion: NodeMotion, step: Array) -> NodeMotion | None:
+        changes.append(float(np.abs(step[:, : motion.nu.shape[1]]).max()))
+        return stepped(motion, step)
+
+    monkeypatch.setattr(batch, "stepped", seen)
+    advanced(begin, 2)
+    # Whole steps would be longer.
+    assert max(changes) == pytest.approx(batch._MAX_CHANGE)

@@ -1,5 +1,7 @@
 """A motion of nodes: what is let go of is the same when it is asked for again."""
 
+from itertools import pairwise
+
 import numpy as np
 
 import selfmotion as sm
@@ -7,6 +9,7 @@ from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid
 from selfmotion.planning.nodes.local_model import LocalModel
+from selfmotion.planning.nodes.motion import broken_intervals, forget, moved_along, stepped
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
@@ -29,14 +32,14 @@ def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
         return [
             motion.h,
             motion.checked.arm.qdd,
-            motion.samples.qddd,
+            motion.sampled.arm.qddd,
             motion.curve_ends,
             np.array([motion.cost, motion.objective, motion.violation]),
-            motion.broken_intervals(),
+            broken_intervals(motion),
         ]
 
     before = known()
-    motion.forget()
+    forget(motion)
     assert not {*motion.__dict__} & {"h", "partials", "checked", "samples", "curve_ends"}
     for again, once in zip(known(), before, strict=True):
         np.testing.assert_array_equal(again, once)
@@ -85,7 +88,7 @@ def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray,
     def jerks(nodes: np.ndarray) -> np.ndarray:
         return grid.spline.at(AT_CONTROLS, 3, grid.spline.ends(nodes))
 
-    found = motion.along(step, changes), motion.stepped(step)
+    found = moved_along(motion, step, changes), stepped(motion, step)
     assert found[0] is not None
     assert found[1] is not None
     assert grid.formulation.errors_between(found[0].trajectory).max() < ON_PATH
@@ -102,3 +105,69 @@ def test_a_step_moves_the_curve_as_linear_rows_say(panda: sm.RobotModel) -> None
     assert many <= 1.5 * few
     assert many_alone >= 5.0 * few_alone
     assert many <= 0.05 * many_alone
+
+
+def test_accelerations_of_cubics_are_exact(panda: sm.RobotModel) -> None:
+    """Whatever the lengths of intervals: means of the Hermite cubics on both sides."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    grid = nodes_of(problem_of((panda, "pose", PANDA_HOME, path))).grid
+    grid = grid.on(np.array([0.0, 0.3, 1.3, 1.5, 2.9, 4.0]))
+    powers = np.random.default_rng(0).normal(size=(4, 7))
+    cubic = np.polynomial.Polynomial
+    q, qd, qdd = (
+        np.stack([cubic(powers[:, k]).deriv(order)(grid.t) if order else cubic(powers[:, k])(grid.t)
+                  for k in range(7)], axis=1)
+        for order in range(3)
+    )  # fmt: skip
+    np.testing.assert_allclose(grid._accelerations(q, qd), qdd, atol=1e-9)
+
+
+def test_rates_of_nodes_change_by_what_a_step_says(panda: sm.RobotModel) -> None:
+    """q̇ by N0 Δν where the node stays; q̈ by N0 Δα where its rates stay as well."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    motion = nodes_of(problem_of((panda, "position", PANDA_HOME, path)))
+    r, rng = motion.nu.shape[1], np.random.default_rng(0)
+    for order, (before, name) in enumerate(
+        ((motion.place.qd, "qd"), (motion.place.qdd, "qdd")), start=1
+    ):
+        step = np.zeros((len(motion.nu), 3 * r))
+        change = rng.normal(size=(len(step), r))
+        step[:, order * r : (order + 1) * r] = change / motion.grid.scale[order * r]
+        found = stepped(motion, step)
+        assert found is not None
+        np.testing.assert_allclose(found.place.q, motion.place.q, atol=1e-9)
+        expected = before + motion.charts.spread(change)
+        np.testing.assert_allclose(getattr(found.place, name), expected, atol=1e-8)
+
+
+def test_bases_turn_as_little_as_possible_from_node_to_node(panda: sm.RobotModel) -> None:
+    """Each basis is the nearest rotation to the one before: products are symmetric, above 0."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    motion = nodes_of(problem_of((panda, "position", PANDA_HOME, path)), 12)
+    manifolds = motion.grid.manifolds
+    bases = manifolds._bases(motion.place.q)
+    for before, after in pairwise(bases):
+        product = after.T @ before
+        np.testing.assert_allclose(product, product.T, atol=1e-9)
+        assert np.linalg.eigvalsh(product).min() > 0.0
+    # They are bases of the null spaces.
+    for basis, q in zip(bases, motion.place.q, strict=True):
+        np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-9)
+        assert np.abs(manifolds.follows.jacobian(q) @ basis).max() < 1e-9
+
+
+def test_an_arm_that_rests_accelerates_where_its_path_does(panda: sm.RobotModel) -> None:
+    """At the ends of a path whose speed begins with a corner only the velocity is held."""
+    first, seconds = panda.pose(PANDA_HOME), 2.0
+    along = np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
+    path = sm.paths.TwistPath(first, lambda t: t * (seconds - t) * along, seconds)
+    motion = nodes_of(problem_of((panda, "pose", PANDA_HOME, path), rest=True))
+    assert motion.grid.formulation.problem.rest_orders == (1, 1)
+    r = motion.nu.shape[1]
+    held = set(motion.grid.held.tolist())
+    for node in (0, len(motion.nu) - 1):
+        assert 3 * r * node + r in held
+        assert 3 * r * node + 2 * r not in held
+        np.testing.assert_allclose(motion.place.qd[node], 0.0, atol=1e-12)
+        tool = panda.jacobian(motion.place.q[node]) @ motion.place.qdd[node]
+        np.testing.assert_allclose(np.abs(tool), seconds * along, atol=1e-6)

@@ -292,8 +292,8 @@ def test_a_start_deep_inside_a_body_is_no_dead_end(panda: sm.RobotModel) -> None
     # In the middle, where the elbow would be: its bodies are to go aside.
     elbow = panda.chain_to("panda_link4").place(free.trajectory(np.array([2.0]))[0]).translation
     ball = sm.obstacles.Sphere("ball", elbow + np.array([0.092, 0.01, -0.076]), 0.05)
-    apart = (sm.constraints.Clearance([ball], 0.01),)
-    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=apart, clearance=None)
+    apart = sm.constraints.Clearance([ball], 0.01)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), clearance=apart)
     begin = nodes_of(problem, 16)
     # In units of 0.1 m.
     assert begin.violation > 0.25

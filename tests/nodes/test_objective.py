@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Counts
 from selfmotion.model.robot import has_masses
+from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective
+from selfmotion.planning.nodes.motion import on_grid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
-from support.arms import Case
+from support.arms import PANDA_HOME, Case
 from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
 
 NEAR = 1e-5
@@ -27,7 +30,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
 
 def force_of(motion):
     """Return λ = ∂F/∂(q, q̇, q̈) of the nodes."""
-    slopes = motion.grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+    slopes = motion.grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
     return motion.grid.spline.scattered(slopes)
 
 
@@ -40,7 +43,7 @@ def matrix_of(motion) -> Banded:
     around = around_of(motion, force_of(motion))
     by = motion.grid.spline.changes(around.changes)
     curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
-    motion.grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+    motion.grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
     matrix = curvature.banded()
     matrix.add(0, 0, around.curvature)
     return matrix
@@ -101,7 +104,7 @@ def test_what_is_minimised_besides_is_no_cost(case: Case) -> None:
     # At rest, starts and stops count; elsewhere nothing does unless the motion is to be calm.
     assert resting.objective > resting.cost
     assert motion.objective == motion.cost
-    smoothed = motion.on(motion.grid.on(motion.grid.t, smoothed=True))
+    smoothed = on_grid(motion, motion.grid.on(motion.grid.t, smoothed=True))
     assert smoothed is not None
     assert smoothed.cost < smoothed.objective < 1.01 * smoothed.cost
 
@@ -117,3 +120,65 @@ def test_the_cost_converges_quickly(case: Case) -> None:
     if errors[-1] > 1e-8 * costs[-1]:
         orders = np.log2(errors[:-1] / errors[1:])
         assert orders.min() > 2.5, (errors, orders)
+
+
+def test_the_number_of_passes_changes_nothing(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    costs = (sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.1))
+    motion = nodes_of(problem_of((panda, "position", PANDA_HOME, path), costs=costs), 6)
+    at_once = matrix_of(motion).dense()
+    monkeypatch.setattr(objective, "_TOGETHER", 1)
+    np.testing.assert_allclose(matrix_of(motion).dense(), at_once, rtol=1e-12)
+
+
+def test_directions_between_nodes_hardly_move_the_tool(panda: sm.RobotModel) -> None:
+    """To second order in the length of an interval, of the self-motions at its two nodes."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    moved = []
+    for count in (16, 32):
+        motion = nodes_of(problem_of((panda, "pose", PANDA_HOME, path)), count)
+        by = motion.grid.spline.changes(around_of(motion).changes)
+        directions = objective._directions(motion.grid.cost, by)
+        units = np.einsum("sni,snj->sij", directions, directions)
+        np.testing.assert_allclose(units, np.broadcast_to(np.eye(1), units.shape), atol=1e-12)
+        jacobians = [panda.task_jacobian(q, sm.Task.POSE) for q in motion.sampled.arm.q]
+        moved.append(max(np.abs(j @ d).max() for j, d in zip(jacobians, directions, strict=True)))
+    assert moved[1] < 0.3 * moved[0] < 0.1
+
+
+def test_springs_of_tolerances_are_part_of_the_cost_and_its_derivatives(
+    panda: sm.RobotModel,
+) -> None:
+    """F rises by ½ ∫ Σ k δ² dt; its gradient and curvature are differences of that."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    band = sm.Relaxation(("rx", "ry"), 0.2)
+    problem = problem_of((panda, "pose", PANDA_HOME, path), relaxations=[band])
+    without = moved(nodes_of(problem), 0.03 * np.ones((13, 9)))
+    grid = without.grid
+    stiff = NodeGrid(
+        grid.formulation.with_springs(3.0), grid.t, grid.conditions, free=False, counts=Counts()
+    )
+    motion = on_grid(centred(without), stiff)
+    assert motion is not None
+    deviations, weights = motion.sampled.tolerances.q, motion.sampled.arm.weights
+    springs = stiff.formulation.springs
+    assert springs is not None
+    assert (springs > 0.0).all()
+    assert np.abs(deviations).max() > 1e-3
+    extra = 0.5 * float(weights @ (deviations**2 @ springs))
+    assert summed(motion) - without.objective == pytest.approx(extra, rel=1e-6)
+    step = random_step(motion, 2) * motion.grid.scale
+    above, below = (summed(moved(motion, sign * NEAR * step)) for sign in (1.0, -1.0))
+    slope = (above - below) / (2 * NEAR)
+    own = gradient(motion)
+    assert abs(np.sum(own * step) - slope) < GRADIENT * np.abs(own * step).sum() + 1e-8
+    bent = (above - 2.0 * summed(motion) + below) / NEAR**2
+    product = float(step.ravel() @ matrix_of(motion).dense() @ step.ravel())
+    assert product == pytest.approx(bent, rel=1e-3)
+
+
+def summed(motion: NodeMotion) -> float:
+    """Return the integral of all that is minimised of motions with springs."""
+    return float(motion.sampled.arm.weights @ motion.grid.cost.integrand(motion.sampled))

@@ -7,12 +7,16 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
+from selfmotion.planning.nodes import minimise
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
+from selfmotion.planning.nodes.motion import on_grid, subdivisions
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
-from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
+from selfmotion.planning.nodes.rows import carried, conservatism, sampled_curve
+from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, control_times, unit_bases
+from selfmotion.problem.constraints import said_once
 from support.arms import PANDA_HOME
 from support.circles import small_circle
-from support.nodes import along, around_of, centred, moved, nodes_of, random_step
+from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
 
 NEAR, DIFFERENCE = 1e-5, 1e-6
 
@@ -40,11 +44,9 @@ CONSTRAINTS = {
 
 def motion_with(panda: sm.RobotModel, name: str):
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    others, apart = said_once(CONSTRAINTS[name](), None)
     problem = sm.Problem(
-        *(panda, path, "position", PANDA_HOME),
-        constraints=CONSTRAINTS[name](),
-        rest=False,
-        clearance=None,
+        *(panda, path, "position", PANDA_HOME), constraints=others, rest=False, clearance=apart
     )
     motion = nodes_of(problem, 10)
     return centred(moved(motion, random_step(motion, 1, 0.02)))
@@ -112,7 +114,9 @@ def test_the_pieces_are_those_of_the_trajectory(panda: sm.RobotModel) -> None:
     """What is optimised is what the certificate judges."""
     motion = motion_with(panda, "two")
     t = motion.grid.spline.sampling.t
-    for order, values in enumerate((motion.samples.q, motion.samples.qd, motion.samples.qdd)):
+    for order, values in enumerate(
+        (motion.sampled.arm.q, motion.sampled.arm.qd, motion.sampled.arm.qdd)
+    ):
         expected = motion.trajectory(t, order)
         np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
 
@@ -122,16 +126,16 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
     motion = motion_with(panda, "tool")
     limits = motion_with(panda, "rates")
     for one in (motion, limits):
-        finer = one.on(one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
+        finer = on_grid(one, one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
         assert finer is not None
         multipliers = np.where(one.h > -500.0, 1.0, 0.0)
-        carried = finer.grid.rows.carried(one.grid.rows, multipliers)
-        assert carried.shape == finer.h.shape
-        carried[finer.h <= -500.0] = 0.0
+        known = carried(finer.grid.rows, one.grid.rows, multipliers)
+        assert known.shape == finer.h.shape
+        known[finer.h <= -500.0] = 0.0
         # Of each kind of row, per time.
         parts = (
             rows.split(each)
-            for rows, each in ((finer.grid.rows, carried), (one.grid.rows, multipliers))
+            for rows, each in ((finer.grid.rows, known), (one.grid.rows, multipliers))
         )
         for mine, theirs in zip(*parts, strict=True):
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)
@@ -152,7 +156,7 @@ def test_intervals_are_divided_where_something_is_beyond_between_points(
     limit = 0.7 * float(turn_rates(free.trajectory, whole).max())
     asked = sm.constraints.ToolLimits(turn_rate=limit)
     motion = nodes_of(small_circle(panda, task="position", constraints=[asked]))
-    parts = motion.subdivisions()
+    parts = subdivisions(motion)
     t = motion.grid.t
     looks = np.linspace(t[:-1], t[1:], 8, endpoint=False, axis=1)
     most = turn_rates(motion.trajectory, looks.ravel()).reshape(looks.shape).max(axis=1)
@@ -204,7 +208,7 @@ def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
 def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel) -> None:
     """Not where only a control point is near: in shares of what each limit is."""
     motion = motion_with(panda, "positions")
-    q, times = motion.trajectory, motion.grid.spline.times_of(0)
+    q, times = motion.trajectory, control_times(motion.grid.spline, 0)
     once = np.unique(times)
     lower, upper = panda.finite_limits()
     # As near to a limit as the curve comes, and as far as it is half of that.
@@ -220,3 +224,47 @@ def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel)
     assert 0 < expected.sum() < len(expected)
     np.testing.assert_array_equal(used[:, 0, joint], expected)
     assert not used[:, 1, joint].any()
+
+
+@pytest.mark.parametrize("name", ["rates", "tool", "clearance"])
+def test_half_of_each_tolerance_is_in_reserve(panda: sm.RobotModel, name: str) -> None:
+    rows = motion_with(panda, name).grid.rows
+    each = [np.full(place.stop - place.start, family.item.tolerance)
+            for family, (place, _) in zip(rows.families, rows._places, strict=True)]  # fmt: skip
+    np.testing.assert_allclose(2.0 * rows.granted, np.concatenate(each))
+
+
+def test_the_curve_between_nodes_is_looked_at_when_it_is_there(panda: sm.RobotModel) -> None:
+    motion = motion_with(panda, "tool")
+    grid = motion.grid
+    curve = sampled_curve(grid.formulation, grid.spline, motion.curve_ends).arm
+    times = curve.sampling.t
+    assert len(times) > 3 * grid.spline.count
+    assert (np.diff(times) >= 0.0).all()
+    assert times[0] >= 0.0
+    assert times[-1] <= grid.t[-1]
+    for order, values in enumerate((curve.q, curve.qd, curve.qdd)):
+        expected = motion.trajectory(times, order)
+        # At a node the jerk jumps, nothing below it does.
+        np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_finer_nodes_lose_less_to_control_points(panda: sm.RobotModel) -> None:
+    """Limits of control points cost nothing where none binds, and little of fine nodes."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+
+    def optimum(limit: float, count: int) -> tuple[float, float]:
+        slow = sm.constraints.JointVelocityLimits(limit)
+        case = panda, "pose", PANDA_HOME, path
+        found = minimise(nodes_of(problem_of(case, constraints=[slow]), count), lambda step: False)
+        motion = found.motion
+        bound = conservatism(motion.grid.rows, found.multipliers, motion.curve_ends)
+        assert (bound >= 0.0).all()
+        return motion.cost, float(bound.sum())
+
+    _, nothing = optimum(10.0, 12)
+    (coarse, lost), (fine, less) = (optimum(1.25, count) for count in (12, 48))
+    assert nothing <= 1e-9 * coarse
+    assert lost > 1e-3 * coarse
+    assert less < 0.1 * lost
+    assert fine < coarse

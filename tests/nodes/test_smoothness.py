@@ -5,7 +5,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes.smoothness import quickness, smoothing_of
+from selfmotion.planning.nodes import smoothness
+from selfmotion.planning.nodes.motion import on_grid
+from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import Quintic
 from support.arms import Case, robot_named, short_line, start_of
 from support.nodes import nodes_of, problem_of
@@ -61,7 +63,7 @@ def test_a_wait_after_a_line_costs_nothing() -> None:
 
 def test_what_starts_too_slowly_for_its_cost_is_quicker(case: Case) -> None:
     motion = nodes_of(problem_of(case, rest=True))
-    problem, samples, cost = motion.grid.formulation, motion.samples, motion.cost
+    problem, samples, cost = motion.grid.formulation, motion.sampled.arm, motion.cost
     assert quickness(problem, samples, 1e3 * cost, 1.0) == 1.0
     much = quickness(problem, samples, 1e-3 * cost, 1.0)
     more = quickness(problem, samples, 1e-4 * cost, 1.0)
@@ -86,3 +88,61 @@ def test_what_is_held_for_a_while_begins_and_ends_without_a_jump() -> None:
         assert share[near > 0.1 * path.duration].max() < 0.5 * share.max()
         for edge in window:
             assert share[np.argmin(np.abs(times - edge))] == pytest.approx(share.max(), rel=1e-2)
+
+
+def held_case(duration: float) -> tuple[Formulation, Quintic]:
+    robot, _, start, path = case_of("panda", "pose")
+    longer = sm.paths.Line(path.pose(0.0), path.pose(path.duration), duration)
+    window = (0.4 * duration, 0.7 * duration)
+    held = sm.Relaxation("rz", 0.1, during=window)
+    problem = problem_of((robot, "pose", start, longer), relaxations=[held])
+    return Formulation.of(problem), Quintic(np.linspace(0.0, duration, 41))
+
+
+def test_penalties_have_the_units_of_times_to_their_powers() -> None:
+    """Of q̈ s², of the jerk s⁴: with twice the duration 4 and 16 times as much."""
+    once, twice = (smoothing_of(*held_case(seconds), smoothed=False) for seconds in (2.0, 4.0))
+    assert once is not None
+    assert twice is not None
+    for order, factor in ((2, 4.0), (3, 16.0)):
+        np.testing.assert_allclose(twice.shares[order], factor * once.shares[order], rtol=1e-9)
+
+
+def test_penalties_end_without_a_jump_of_their_second_derivatives() -> None:
+    """b falls to 0 as the third power of the distance from where it ends."""
+    wide = smoothness._NEAR_REST
+    near = [smoothness._faded(np.array([wide - away]), 1.0)[0] for away in (1e-2, 1e-3, 1e-4)]
+    np.testing.assert_allclose(np.array(near[1:]) / near[:-1], 1e-3, rtol=0.05)
+    assert smoothness._faded(np.array([wide, 2.0 * wide]), 1.0).tolist() == [0.0, 0.0]
+    assert smoothness._faded(np.zeros(1), 1.0).tolist() == [1.0]
+
+
+def test_quickness_and_smoothing_are_decided_by_what_they_add() -> None:
+    """The penalty itself decides, up to named shares of the cost."""
+    case = case_of("panda", "pose")
+    resting = nodes_of(problem_of(case, rest=True))
+    problem, samples = resting.grid.formulation, resting.sampled.arm
+    added = resting.grid.cost.roughness(resting.curve_ends)
+    most = added / smoothness._TOO_MUCH
+    assert quickness(problem, samples, most * 1.001, 1.0) == 1.0
+    assert quickness(problem, samples, most * 0.999, 1.0) < 1.0
+    # It has an end, above 0.
+    least = [quickness(problem, samples, share * most, 1.0) for share in (1e-12, 1e-15)]
+    assert least[0] == least[1] > 0.0
+    moving = nodes_of(problem_of(case))
+    problem, samples = moving.grid.formulation, moving.sampled.arm
+    smoothed = on_grid(moving, moving.grid.on(moving.grid.t, smoothed=True))
+    assert smoothed is not None
+    most = (smoothed.objective - smoothed.cost) / smoothness._LITTLE
+    assert can_be_smoothed(problem, samples, most * 1.001)
+    assert not can_be_smoothed(problem, samples, most * 0.999)
+
+
+def test_costs_without_speeds_take_the_usual_weights() -> None:
+    case = case_of("panda", "pose")
+    posture = sm.costs.Posture(2.0, posture=case[2])
+    problem = Formulation.of(problem_of(case, costs=[posture], rest=True))
+    found = smoothing_of(problem, Quintic(np.linspace(0.0, 1.0, 9)), smoothed=False)
+    assert found is not None
+    usual = np.asarray(sm.costs.JointVelocity.usual(case[0]).weight)
+    np.testing.assert_allclose(np.diagonal(found.weight), np.broadcast_to(usual, case[0].dof))

@@ -14,6 +14,8 @@ from selfmotion.planning.nodes.spline import (
     ORDERS,
     POINTS,
     Quintic,
+    control_times,
+    point_shares,
     unit_bases,
 )
 
@@ -50,7 +52,7 @@ def test_the_curve_goes_through_its_nodes_as_a_quintic(order: int, shares: Array
     expected = curve(spline.points.t)
     near(spline.at_points(order, ends), expected)
     which = np.array([len(expected) - 1, 3, 0, 4])
-    k, tables = spline.point_shares(which)
+    k, tables = point_shares(spline, which)
     near((tables[:, order, None] @ ends[k])[:, 0], expected[which])
     with pytest.raises(AssertionError):
         near((tables[:, order, None] @ ends[k[::-1]])[:, 0], expected[which])
@@ -68,7 +70,7 @@ def test_control_points_are_those_of_bernstein(order: int) -> None:
     rising = np.stack([power.deriv(k)(T) if k else power(T) for k in range(3)], axis=1)
     near(
         spline.at(AT_CONTROLS, order, spline.ends(rising[:, :, None]))[..., 0],
-        spline.times_of(order),
+        control_times(spline, order),
     )
 
 
@@ -127,3 +129,13 @@ def test_differences_are_exact_of_polynomials_through_a_stencil(count: int) -> N
     first, second = Quintic(t).differences(x)
     np.testing.assert_allclose(first[:, 0], poly.deriv(1)(t), rtol=1e-9)
     np.testing.assert_allclose(second[:, 0], poly.deriv(2)(t), rtol=1e-9, atol=1e-9)
+
+
+def test_differences_are_the_same_backwards_in_time() -> None:
+    """Stencils are in the middle: first derivatives change their sign, second ones do not."""
+    t = np.array([0.0, 0.1, 0.4, 0.6, 0.9, 1.3, 1.4, 2.0])
+    x = np.random.default_rng(2).normal(size=(len(t), JOINTS))
+    first, second = Quintic(t).differences(x)
+    back_first, back_second = Quintic(t[-1] - t[::-1]).differences(x[::-1])
+    near(back_first[::-1], -first)
+    near(back_second[::-1], second)

@@ -19,6 +19,7 @@ from selfmotion.planning.paper import (
     converged_minimum_norm,
     solve,
 )
+from selfmotion.planning.paper.objective import residual_tangents, residuals, unmet
 from support.arms import PANDA_HOME, central_difference, robot_named
 
 # Exact gradients against extrapolated differences, relative to the largest entry.
@@ -113,15 +114,15 @@ def test_the_optimum_is_that_of_another_solver(name: str, asked: str, free: bool
         jac=lambda u: scale.T @ objective.gradient(scale @ u),
         constraints={
             "type": "eq",
-            "fun": lambda u: objective.residuals(scale @ u),
-            "jac": lambda u: objective.residual_tangents(scale @ u) @ scale,
+            "fun": lambda u: residuals(objective, scale @ u),
+            "jac": lambda u: residual_tangents(objective, scale @ u) @ scale,
         },
         method="SLSQP",
         options={"ftol": 1e-13, "maxiter": 300},
     )
-    assert np.abs(objective.residuals(scale @ other.x)).max() < 1e-8
+    assert np.abs(residuals(objective, scale @ other.x)).max() < 1e-8
     assert found.cost == pytest.approx(float(other.fun), rel=OPTIMUM)
-    assert np.abs(objective.residuals(found.x)).max() <= CLOSED
+    assert np.abs(residuals(objective, found.x)).max() <= CLOSED
 
 
 @pytest.mark.parametrize("asked", CLOSED_PATHS)
@@ -131,7 +132,7 @@ def test_ends_are_met_to_rounding_on_any_grid(name: str, asked: str) -> None:
     assert found.unmet == ()
     finer = found.refined(np.arange(found.steps) % 3 == 0).refined()
     for solution in (found, finer, finer.again()):
-        assert np.abs(solution.objective.residuals(solution.x)).max() <= CLOSED
+        assert np.abs(residuals(solution.objective, solution.x)).max() <= CLOSED
     assert finer.steps > 2 * found.steps
 
 
@@ -152,9 +153,9 @@ def test_unknowns_move_along_the_ends_and_are_orthonormal() -> None:
     np.testing.assert_allclose(own, np.eye(function.size), atol=BETWEEN)
     away = 0.1 * np.random.default_rng(2).normal(size=function.size)
     for place in (y, away):
-        rows = found.objective.residual_tangents(function.point(place))
+        rows = residual_tangents(found.objective, function.point(place))
         np.testing.assert_allclose(rows @ function.tangent(place), 0.0, atol=ALGEBRA)
-        assert np.abs(found.objective.residuals(function.point(place))).max() <= CLOSED
+        assert np.abs(residuals(found.objective, function.point(place))).max() <= CLOSED
 
 
 def test_an_inverse_hessian_comes_back_from_decision_vectors() -> None:
@@ -172,9 +173,9 @@ def test_a_closed_point_is_the_nearest_in_the_metric() -> None:
     step = rng.normal(size=objective.size)
     for size in (1e-2, 5e-3):
         x = found.x + size * step
-        rows, inverse = objective.residual_tangents(x), np.linalg.inv(null_motion_metric(found))
+        rows, inverse = residual_tangents(objective, x), np.linalg.inv(null_motion_metric(found))
         spread = inverse @ rows.T
-        linear = x - spread @ np.linalg.solve(rows @ spread, objective.residuals(x))
+        linear = x - spread @ np.linalg.solve(rows @ spread, residuals(objective, x))
         off.append(np.linalg.norm(closed(objective, x) - linear))
     assert off[1] < 0.3 * off[0]
 
@@ -229,8 +230,8 @@ def test_an_end_that_is_missed_is_named_on_either_side() -> None:
     signs = set()
     for seed in range(6):
         x = 0.05 * np.random.default_rng(seed).normal(size=objective.size)
-        signs.add(float(np.sign(objective.residuals(x)[0])))
-        assert objective.unmet(x)[0].startswith("closed path: the configuration at the end")
+        signs.add(float(np.sign(residuals(objective, x)[0])))
+        assert unmet(objective, x)[0].startswith("closed path: the configuration at the end")
     assert signs == {-1.0, 1.0}
 
 

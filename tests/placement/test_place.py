@@ -76,7 +76,7 @@ def panda() -> sm.Problem:
     block = sm.obstacles.Box("block", middle - [0.0, 0.0, 0.15], [0.1, 0.1, 0.05])
     wall = sm.obstacles.Box("wall", [0.9, 0.0, 0.5], [0.02, 1.0, 0.4])
     clear = sm.constraints.Clearance([block, wall], 5e-3)
-    return sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=[*LIMITS, clear])
+    return sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=LIMITS, clearance=clear)
 
 
 @pytest.fixture(scope="module")
@@ -175,8 +175,8 @@ def test_the_base_is_moved_for_what_stays(tmp_path: Path) -> None:
 def test_only_what_belongs_to_the_part_moves_along() -> None:
     places = places_of([panda()], "part", ["block"], None, ("x", "yaw"))
     (moved,) = places.at(np.array([0.1, 0.2]))
-    bodies = {body.name: body for body in moved.constraints[-1].obstacles}  # type: ignore[attr-defined]
-    before = {body.name: body for body in panda().constraints[-1].obstacles}  # type: ignore[attr-defined]
+    bodies = {body.name: body for body in moved.clearances[0].obstacles}
+    before = {body.name: body for body in panda().clearances[0].obstacles}
     np.testing.assert_array_equal(bodies["wall"].pose, before["wall"].pose)
     # What is between path and block stays, whatever both are moved by.
     for t in (0.0, 1.5):
@@ -184,7 +184,7 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
         same = before["block"].pose.inverse() * panda().path.pose(t)
         np.testing.assert_allclose(apart.homogeneous, same.homogeneous, atol=1e-12)
     (seen,) = places_of([panda()], "base", None, None, ("x",)).at(np.array([0.1]))
-    walls = {body.name: body for body in seen.constraints[-1].obstacles}  # type: ignore[attr-defined]
+    walls = {body.name: body for body in seen.clearances[0].obstacles}
     np.testing.assert_array_equal(walls["wall"].pose, before["wall"].pose)
     home = sm.NAMED_ARMS["panda"].home
     shift = seen.robot.pose(home).translation - panda().robot.pose(home).translation
@@ -358,7 +358,7 @@ def test_a_job_is_placed_as_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             after.path.pose(0.3).homogeneous, (by * before.path.pose(0.3)).homogeneous, atol=1e-12
         )
         bodies = [
-            {item.name: item.pose.translation for item in problem.clearance.obstacles}
+            {item.name: item.pose.translation for item in problem.clearances[0].obstacles}
             for problem in (before, after)
         ]
         np.testing.assert_allclose(bodies[1]["clamp"], by.act(bodies[0]["clamp"]), atol=1e-12)

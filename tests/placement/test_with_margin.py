@@ -27,7 +27,7 @@ def beside_the_elbow() -> sm.Problem:
     ahead = (last - first) / np.linalg.norm(last - first)
     ball = sm.obstacles.Sphere("ball", last + 0.16 * ahead, 0.05)
     clear = sm.constraints.Clearance([ball], 5e-3)
-    return problem.changed(start=motion.q[0], constraints=(*LIMITS, clear))
+    return problem.changed(start=motion.q[0], constraints=LIMITS, clearance=clear)
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +134,8 @@ def test_what_is_told_is_of_the_plan_that_is_returned(
 
     def failing(asked: sm.Problem, **options: object) -> sm.Plan:
         made = whole(asked, **options)  # type: ignore[arg-type]
-        if len(asked.constraints) > len(problem.constraints):
-            kept.append(asked.constraints[-1])
+        if len(asked.clearances) > len(problem.clearances):
+            kept.append(asked.clearances[0])
             wrong = dataclasses.replace(made.certificate, failures=("it was made to fail",))
             # Nearer it is not: it is the motion of before.
             made = dataclasses.replace(first, certificate=wrong)

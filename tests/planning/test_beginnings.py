@@ -9,6 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.planning.nodes import NodeMotion, Optimum, Step, minimise
+from selfmotion.planning.nodes.motion import centred
 from selfmotion.planning.planner import local_search
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.outcomes import on_the_way
@@ -23,7 +24,7 @@ def test_a_ball_behind_the_elbow_is_passed_on_the_other_side(panda: sm.RobotMode
     circle = sm.paths.Circle.around(panda.pose(start), 0.112, 4.0, normal=[-0.023, 0.138, -0.99])
     ball = sm.obstacles.Sphere("ball", [-0.363, 0.168, 0.281], 0.08)
     free = sm.Problem(panda, circle, start=start)
-    asked = replace(free, constraints=[*free.constraints, sm.constraints.Clearance((ball,))])
+    asked = replace(free, clearance=sm.constraints.Clearance((ball,)))
     assert sm.plan(asked).certificate.verified
     # Where nothing stands there, the arm does not give way.
     assert sm.obstacles.CollisionModel(panda, (ball,)).worst(sm.plan(free).trajectory.q).value < 0.0
@@ -63,8 +64,8 @@ def test_what_keeps_everything_is_not_given_up_for_what_costs_less(
 
     def astray(begin: NodeMotion, callback: Callable[[Step], bool], *_, **__) -> Optimum:
         callback(Step(begin, 1.0, 0.0))
-        alone = minimise(begin.grid.without_rows().at(begin.centred), lambda _: False)
-        gone = begin.grid.at(alone.motion.centred)
+        alone = minimise(begin.grid.without_rows().at(centred(begin)), lambda _: False)
+        gone = begin.grid.at(centred(alone.motion))
         return replace(alone, motion=gone, multipliers=np.zeros(len(gone.h)))
 
     monkeypatch.setattr(local_search, "minimise", astray)
@@ -82,7 +83,7 @@ def test_where_a_motion_breaks_most_is_told(panda: sm.RobotModel) -> None:
     problem = limited_circle(panda)
     begin = nodes_of(replace(problem, constraints=()))
     (limits,) = problem.constraints
-    broken = on_the_way(nodes_of(problem).grid.at(begin.centred))
+    broken = on_the_way(nodes_of(problem).grid.at(centred(begin)))
     beyond = (begin.place.q - limits.upper).max(axis=1)
     assert beyond.max() > 0.0
     assert broken.breaks_at == begin.grid.t[np.argmax(beyond)]

@@ -41,12 +41,10 @@ def test_a_rod_between_the_prongs_of_a_fork(tmp_path: Path, gap: float, verified
     along[:3, :3] = home.rotation @ np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
     along[:3, 3] = home.translation
     rod = sm.obstacles.Cylinder("rod", along, 0.005, 0.3)
-    limits = [
-        sm.constraints.JointPositionLimits(),
-        sm.constraints.Clearance([rod], 1.5 * CLEARANCE),
-    ]
+    limits, apart = [sm.constraints.JointPositionLimits()], 1.5 * CLEARANCE
+    clearance = sm.constraints.Clearance([rod], apart)
     plan = sm.plan(
-        sm.Problem(panda, line, "pose", PANDA_HOME, constraints=limits),
+        sm.Problem(panda, line, "pose", PANDA_HOME, constraints=limits, clearance=clearance)
     )
     names = [item.name for item in plan.report.attempts]
     assert plan.certificate.verified == verified
@@ -69,7 +67,7 @@ def test_a_rod_beside_a_prong_is_left_room_by_a_tolerance(tmp_path: Path) -> Non
     # From the middle of the way on; 1 mm is left between them where the tool is on its path.
     along[:3, 3] = home.translation + home.rotation @ np.array([0.014, 0.18, 0.0])
     rod = sm.obstacles.Cylinder("rod", along, 0.005, 0.3)
-    limits = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([rod], 2e-3)]
+    limits = [sm.constraints.JointPositionLimits()]
     aside = sm.Relaxation("x", 5e-3, axes="tool")
     plan = sm.plan(
         sm.Problem(
@@ -78,6 +76,7 @@ def test_a_rod_beside_a_prong_is_left_room_by_a_tolerance(tmp_path: Path) -> Non
             "pose",
             PANDA_HOME,
             constraints=limits,
+            clearance=sm.constraints.Clearance([rod], 2e-3),
             relaxations=[aside],
         )
     )

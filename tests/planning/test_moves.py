@@ -28,7 +28,7 @@ def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
         sm.constraints.JointVelocityLimits(),
         sm.constraints.JointAccelerationLimits(20.0),
     ]
-    problem = sm.Problem(robot, path, "pose", constraints=[*limits, clearance])
+    problem = sm.Problem(robot, path, "pose", constraints=limits, clearance=clearance)
     mover = _Mover(between_parts(problem), None, np.random.default_rng(0), lambda *_: None)
 
     def refuted(motion: sm.Trajectory) -> tuple[str, ...]:

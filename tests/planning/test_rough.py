@@ -103,7 +103,9 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
     place = tuple(problem.robot.pose(middle.q[len(middle.q) // 2]).translation)
     for center, is_best in ((place, False), ((2.0, 2.0, 2.0), True)):
         ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", center, 0.1)])
-        among = Ranking(Formulation.of(replace(problem, constraints=[ball])), effort(), told)
+        among = Ranking(
+            Formulation.of(replace(problem, constraints=[], clearance=ball)), effort(), told
+        )
         assert among.run(starts, 3)
         same = among.ranked[0].cost == pytest.approx(free.ranked[0].cost, rel=1e-6)
         assert same is is_best

@@ -32,7 +32,8 @@ def past_a_plate(size: tuple[float, float, float], up: float, *, free: bool = Fa
         sm.paths.Line(begin, end, 4.0),
         "pointing",
         None if free else home,
-        constraints=[*limits, sm.constraints.Clearance([plate], 0.01)],
+        constraints=limits,
+        clearance=sm.constraints.Clearance([plate], 0.01),
     )
 
 
@@ -46,7 +47,7 @@ def test_a_verdict_begins_with_what_stops_the_motion(tmp_path: Path) -> None:
     assert plan.report.attempts[-1].name == "what stops it"
     # Of configurations that are drawn at that time none keeps away from the plate.
     when = float(verdict.removeprefix(said).split(" s: ")[0])
-    robot, rng, clearance = problem.robot, np.random.default_rng(5), problem.constraints[-1]
+    robot, rng, clearance = problem.robot, np.random.default_rng(5), problem.clearances[0]
     model, looked_at = clearance.model(robot), 0
     for _ in range(DRAWN):
         seed = rng.uniform(-3.0, 3.0, robot.dof)

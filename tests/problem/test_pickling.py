@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.problem.problem import KEPT, NO_OVERLAP
+from selfmotion.problem.constraints import NO_OVERLAP
+from selfmotion.problem.problem import KEPT
 from support.arms import PANDA_HOME, robot_named
 
 WAYS: dict[str, Callable[[Any], Any]] = {

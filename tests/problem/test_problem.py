@@ -107,7 +107,7 @@ def test_a_path_inside_an_obstacle_is_told_where_the_tool_has_no_body(
     held = [sm.obstacles.Sphere("tip", [0.0] * 3, 0.005)] if shape == "held" else []
     robot = sm.load_robot("panda", bodies=held) if held else problem.robot
     asked = dataclasses.replace(
-        problem, robot=robot, constraints=[sm.constraints.Clearance([obstacle])]
+        problem, robot=robot, constraints=[], clearance=sm.constraints.Clearance([obstacle])
     )
     told = [text for text in asked.remarks if "nothing is checked there" in text]
     assert len(told) == (shape in ("box", "capsule", "mesh"))
@@ -199,7 +199,8 @@ def test_a_given_start_in_collision_is_called_that() -> None:
             stay,
             "position",
             home if given else None,
-            constraints=[sm.constraints.Clearance([ball], distance=0.02)],
+            constraints=[],
+            clearance=sm.constraints.Clearance([ball], distance=0.02),
             relaxations=[sm.Relaxation("z", 0.01)] if relaxed else [],
         )
         found = problem.certify(motion)

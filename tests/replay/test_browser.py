@@ -293,12 +293,12 @@ LIT = """() => {
 
 def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     plan = shelf_plan()
-    *others, clearance = plan.problem.constraints
+    (clearance,) = plan.problem.clearances
     world = clearance.model(plan.robot)
     # Nearer than twice what is asked: of what is farther apart nothing is coloured.
     near = max(world.distance(plan.trajectory(time)).value for time in (0.5, 2.0))
-    asked = (*others, Clearance(clearance.obstacles, 0.6 * near))
-    plan = replace(plan, problem=replace(plan.problem, constraints=asked))
+    asked = Clearance(clearance.obstacles, 0.6 * near)
+    plan = replace(plan, problem=replace(plan.problem, clearance=asked))
     page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):
         page.evaluate("t => replay.seek(t)", time)
@@ -340,8 +340,7 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
 def test_bodies_that_meet_are_red(open_page, tmp_path):
     plan = arm_plan("panda")
     block = Box("block", plan.path.pose(1.0).translation, (0.05, 0.05, 0.05))
-    constraints = (*plan.problem.constraints, Clearance([block]))
-    plan = replace(plan, problem=replace(plan.problem, constraints=constraints))
+    plan = replace(plan, problem=replace(plan.problem, clearance=Clearance([block])))
     page = open_page(write_replay(plan, tmp_path / "block.html"))
     page.evaluate("replay.seek(1.0)")
     assert page.locator("#pair").inner_text().endswith("and block meet")
@@ -374,8 +373,7 @@ def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.0, 0.5), np.array([0.0, 0.05, 0.1]))
     torch = Box("torch", pose, (0.04, 0.04, 0.2), frame="panda_hand")
     shelf = Box("shelf", [0.9, 0.0, 0.2], (0.1, 0.1, 0.1), frame="panda_link0")
-    constraints = (*plan.problem.constraints, Clearance([torch, shelf]))
-    plan = replace(plan, problem=replace(plan.problem, constraints=constraints))
+    plan = replace(plan, problem=replace(plan.problem, clearance=Clearance([torch, shelf])))
     page = open_page(write_replay(plan, tmp_path / "torch.html"))
     robot, data = plan.robot, plan.robot.model.createData()
     hand = robot.model.getFrameId("panda_hand", pin.FrameType.BODY)

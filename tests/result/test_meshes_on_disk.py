@@ -18,7 +18,12 @@ def test_a_mesh_that_was_replaced_is_told(tmp_path: Path) -> None:
     post = sm.obstacles.Mesh("post", [1.0, 1.0, 1.0], file)
     circle = sm.paths.Circle.around(panda.pose(start), radius=0.05, duration=4.0)
     problem = sm.Problem(
-        panda, circle, task="position", start=start, constraints=[sm.constraints.Clearance([post])]
+        panda,
+        circle,
+        task="position",
+        start=start,
+        constraints=[],
+        clearance=sm.constraints.Clearance([post]),
     )
     plan = sm.plan(problem, max_evaluations=3)
     plan.save(tmp_path / "plan.npz")
@@ -26,7 +31,12 @@ def test_a_mesh_that_was_replaced_is_told(tmp_path: Path) -> None:
     trimesh.creation.box((0.2, 0.1, 0.1)).export(file)
     # A certificate is none of the same names with other bodies.
     again = sm.Problem(
-        panda, circle, task="position", start=start, constraints=[sm.constraints.Clearance([post])]
+        panda,
+        circle,
+        task="position",
+        start=start,
+        constraints=[],
+        clearance=sm.constraints.Clearance([post]),
     )
     assert problem.digest == plan.certificate.problem != again.digest
     loaded = sm.load_plan(tmp_path / "plan.npz")

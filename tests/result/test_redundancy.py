@@ -9,6 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.errors import FileFormatError, ProblemError
 from selfmotion.model.robot import SwivelAngle
+from selfmotion.problem.constraints import NO_OVERLAP
 from selfmotion.result import Reason, RedundancyMap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.redundancy_laws import faults
@@ -52,9 +53,10 @@ def circle(*, post: bool = False, clearance: float = 0.0) -> sm.Plan:
     """Panda's circle, beside a post or alone."""
     robot = robot_named("panda")
     path = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 4.0)
-    bodies = [sm.constraints.Clearance([POST], clearance)] if post else []
-    asked = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(), *bodies]
-    return sm.plan(sm.Problem(robot, path, "pose", PANDA_HOME, constraints=asked))
+    apart = sm.constraints.Clearance([POST], clearance) if post else NO_OVERLAP
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+    problem = sm.Problem(robot, path, "pose", PANDA_HOME, constraints=limits, clearance=apart)
+    return sm.plan(problem)
 
 
 def bodies_of(plan: sm.Plan) -> Bodies:

@@ -119,10 +119,8 @@ def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotMod
         panda,
         path,
         start=PANDA_HOME,
-        constraints=[
-            sm.constraints.JointVelocityLimits(slow),
-            sm.constraints.Clearance(wall, 0.03),
-        ],
+        constraints=[sm.constraints.JointVelocityLimits(slow)],
+        clearance=sm.constraints.Clearance(wall, 0.03),
     )
     plan = sm.plan(problem, max_evaluations=5)
     retimed = sm.retime(plan, 10.0)

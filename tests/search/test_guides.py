@@ -60,7 +60,11 @@ def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotM
     # Beside the forearm, near enough to be watched.
     ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", (0.2, 0.25, 0.6), 0.05)], 0.01)
     problem = sm.Problem(
-        panda, path, constraints=[ball], relaxations=[sm.Relaxation("rz", 0.3, during=(1.0, 2.0))]
+        panda,
+        path,
+        constraints=[],
+        clearance=ball,
+        relaxations=[sm.Relaxation("rz", 0.3, during=(1.0, 2.0))],
     )
     formulation = Formulation.of(problem)
     t = np.linspace(0.0, 4.0, 9)

@@ -62,8 +62,11 @@ def test_it_never_refuses_what_a_known_motion_follows(name: str, task: str) -> N
                 break
         else:
             continue
-        asked = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([ball], 1e-3)]
-        assert looked(sm.Problem(robot, path, task, constraints=asked, rest=False)) is None
+        asked = {
+            "constraints": [sm.constraints.JointPositionLimits()],
+            "clearance": sm.constraints.Clearance([ball], 1e-3),
+        }
+        assert looked(sm.Problem(robot, path, task, rest=False, **asked)) is None
         looks += 1
     assert looks >= 3
 
@@ -116,8 +119,10 @@ def test_what_stands_on_the_path_is_named() -> None:
     end = pose.copy()
     end.translation = pose.translation + np.array([0.0, 0.1, 0.0])
     ball = sm.obstacles.Sphere("ball", end.translation, 0.04)
-    asked = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([ball], 1e-3)]
-    problem = sm.Problem(panda, sm.paths.Line(pose, end, 2.0), constraints=asked)
+    clearance = sm.constraints.Clearance([ball], 1e-3)
+    limits = [sm.constraints.JointPositionLimits()]
+    path = sm.paths.Line(pose, end, 2.0)
+    problem = sm.Problem(panda, path, constraints=limits, clearance=clearance)
     found = looked(problem)
     assert found is not None
     assert found.is_met
@@ -170,7 +175,7 @@ def test_what_meets_something_is_within_the_limits_and_nearer_than_wanted() -> N
     elbow.rotation = np.eye(3)
     clearance = sm.constraints.Clearance([sm.obstacles.Box("box", elbow, [0.15] * 3)], 0.01)
     limits = sm.constraints.JointPositionLimits(*sides)
-    found = looked(sm.Problem(robot, path, constraints=[limits, clearance]))
+    found = looked(sm.Problem(robot, path, constraints=[limits], clearance=clearance))
     assert found is not None
     assert found.is_met
     met = found.found.met

@@ -56,9 +56,10 @@ def plan() -> sm.Plan:
     constraints = [
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
-        sm.constraints.Clearance([block], 5e-3),
     ]
-    return sm.plan(sm.Problem(robot, circle, start=start, constraints=constraints)).require()
+    apart = sm.constraints.Clearance([block], 5e-3)
+    problem = sm.Problem(robot, circle, start=start, constraints=constraints, clearance=apart)
+    return sm.plan(problem).require()
 
 
 def test_numbers_are_those_of_certificate_report_and_margins(plan: sm.Plan, tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def constraint_rows() -> list[Row]:
         Row(
             area,
             "Clearance() of an arm without bodies",
-            lambda _: problem_with(constraints=[sm.constraints.Clearance([box])]),
+            lambda _: problem_with(constraints=[], clearance=sm.constraints.Clearance([box])),
         ),
         *bad_values_of(
             area,

@@ -31,11 +31,10 @@ mu = 0.001
 [[constraints]]
 kind = "JointPositionLimits"
 
-[[constraints]]
-kind = "Clearance"
+[clearance]
 distance_mm = 10
 
-[[constraints.obstacles]]
+[[clearance.obstacles]]
 shape = "box"
 name = "post"
 position = [0, -0.6, 0.6]

@@ -30,7 +30,8 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
     )
     # Where nothing is asked, these laws are those of motions without any limits.
     ends = minimum_norm.start, minimum_norm.end
-    whole = problem.constraints or problem.relaxations
+    apart = [item for item in problem.clearances if not item.is_no_overlap]
+    whole = problem.constraints or apart or problem.relaxations
     conditions = formulation.conditions(*ends) if whole else BoundConditions()
     t = np.linspace(0.0, problem.path.duration, count + 1)
     grid = NodeGrid(formulation, t, conditions, free=free, counts=Counts())

@@ -63,5 +63,4 @@ def shelf_plan() -> sm.Plan:
         Capsule("a/b", at(0.4, 0.1, 0.0), 0.02, 0.2),
         Mesh("part", at(0.8, 0.0, 0.0), file, 0.5),
     )
-    constraints = (*plan.problem.constraints, Clearance(obstacles))
-    return replace(plan, problem=replace(plan.problem, constraints=constraints))
+    return replace(plan, problem=replace(plan.problem, clearance=Clearance(obstacles)))

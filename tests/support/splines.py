@@ -8,6 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper.objective import node_tangents
 
 # Conditions that come this near to being broken by x = 0 are asked for.
 NEAR = -0.6
@@ -31,7 +32,7 @@ def best_spline(problem: sm.Problem, intervals: int = 16, steps: int = 64) -> fl
         return -np.concatenate([item.residual(samples).ravel()[own] for item, own in rows])
 
     def slopes(x: Array) -> Array:
-        samples, motion = objective.samples(x), objective.node_tangents(x)
+        samples, motion = objective.samples(x), node_tangents(objective, x)
         rows = zip(bound, near, strict=True)
         tables = (
             item.tangents(samples, motion).reshape(-1, objective.size)[own] for item, own in rows

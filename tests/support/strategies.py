@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import NullMotion
+from selfmotion.problem.constraints import NO_OVERLAP, said_once
 
 JOINTS = ("revolute", "revolute", "revolute", "prismatic", "continuous")
 AXES = ("0 0 1", "0 1 0", "1 0 0", "0 0 -1", "0.6 0 0.8", "0 0 2")
@@ -160,6 +161,8 @@ def build(words: Generated, folder: Path) -> sm.Problem:
         _constraint(name, words, robot, path, task, folder, rng) for name in words.constraints
     ]
     replaced = {type(item) for item in wanted}
+    constraints = [*(item for item in limits if type(item) not in replaced), *wanted]
+    others, apart = said_once(constraints, NO_OVERLAP)
     return sm.Problem(
         robot,
         path,
@@ -167,9 +170,10 @@ def build(words: Generated, folder: Path) -> sm.Problem:
         start,
         _null_motion(words.null_motion),
         [_cost(name, q, lower, upper) for name in words.costs or ("velocity",)],
-        [*(item for item in limits if type(item) not in replaced), *wanted],
+        others,
         _relaxations(words.relaxed, task, duration),
         sm.Damping() if words.damped else None,
+        apart,
     )
 
 

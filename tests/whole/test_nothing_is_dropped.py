@@ -44,10 +44,13 @@ PROBLEM: dict[str, Any] = {
     "start": PANDA_HOME,
     "null_motion": sm.PolynomialNullMotion(2),
     "costs": [sm.costs.JointVelocity(weight=2.0)],
-    "constraints": [sm.constraints.Clearance([box("post", HERE.translation)], 0.01)],
+    "constraints": [sm.constraints.JointPositionLimits(PANDA_HOME - 1e-3, PANDA_HOME + 1e-3)],
     "relaxations": [sm.Relaxation("y", 0.02)],
     "damping": sm.Damping(),
-    "clearance": sm.constraints.Clearance([box("wall", HERE.translation + FAR)], 0.01),
+    "clearance": [
+        sm.constraints.Clearance([box("post", HERE.translation)], 0.01),
+        sm.constraints.Clearance([box("wall", HERE.translation + FAR)], 0.01),
+    ],
     "rest": False,
     "also": [sm.Follow(PANDA.pose(PANDA_HOME), "position", tool="panda_link1")],
 }

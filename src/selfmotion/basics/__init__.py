@@ -29,6 +29,7 @@ from selfmotion.basics.errors import (
     DeadlineError as DeadlineError,
     FeedError as FeedError,
     FileFormatError as FileFormatError,
+    FormerUseWarning as FormerUseWarning,
     InverseKinematicsError as InverseKinematicsError,
     NoSequenceError as NoSequenceError,
     PathError as PathError,

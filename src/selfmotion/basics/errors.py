@@ -88,6 +88,13 @@ class FeedError(PathError):
         self.time = time
 
 
+class FormerUseWarning(FutureWarning):
+    """Something was said in a way that goes with the next version; the text says the new one."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(message)
+
+
 class ProblemError(SelfmotionError):
     """Robot, path, task and start do not fit together."""
 

@@ -2,7 +2,7 @@
 
 from selfmotion.problem.problem import (
     KEPT as KEPT,
-    NO_OVERLAP as NO_OVERLAP,
+    OF_MAKER as OF_MAKER,
     START_TOLERANCE as START_TOLERANCE,
     Problem as Problem,
     arm_and_constraints as arm_and_constraints,

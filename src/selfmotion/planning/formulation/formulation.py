@@ -21,6 +21,7 @@ from selfmotion.problem.constraints import (
     BoundConstraint,
     BoundEnd,
     BoundLimits,
+    Clearance,
     Conditions,
     Constraint,
     DependsOn,
@@ -197,12 +198,22 @@ class Formulation:
         """See `Problem.along`."""
         return self.problem.along(other, when)
 
+    @cached_property
+    def no_overlap(self) -> Clearance | None:
+        """The last clearance, if it asks no more than that links do not overlap; else None.
+
+        Motions are optimised without it at first: few break it, and distances take long.
+        """
+        last = self.problem.clearances[-1:]
+        lazy = (item for item in last if item.is_no_overlap and item.applies(self.robot))
+        return next(lazy, None)
+
     def keeps_off_itself(self, q: Array) -> bool:
         """Whether the arm's meshes in configurations (K, n) are free of self-collision.
 
-        Only for the default clearance: constraints are the optimisation's.
+        Only for `no_overlap`: other clearances are the optimisation's.
         """
-        if self.problem.own_collision is None:
+        if self.no_overlap is None:
             return True
         own = q[:, : self.robot.dof]
         return all(model.worst(own).value >= far for model, far in self.envelope.bodies)
@@ -212,7 +223,7 @@ class Formulation:
     ) -> BoundConditions:
         """Return the conditions on motions, given first and last configuration, (n,) each.
 
-        Those of the initial motion. Without the default clearance unless `apart`; with links
+        Those of the initial motion. Without `no_overlap` unless `apart`; with links
         `decomposed` where their hulls are too large. With the arm's own limits where constraints
         have none: no motion beyond these is verified. With the bands of tolerances, and that pinned
         ends are on the path.
@@ -235,7 +246,9 @@ class Formulation:
         """Return the conditions on the arm's motion, of all constraints in their order."""
         known, problem = self._known_conditions, self.problem
         if (apart, decomposed) not in known:
-            given = [*self._own_limits, *(problem.all_constraints if apart else problem.applying)]
+            given = [*self._own_limits, *problem.all_constraints]
+            if self.no_overlap is not None and not apart:
+                given.pop()
             if all(self.problem.rests):
                 given = [item.at_rest() for item in given]
             known[apart, decomposed] = Conditions.joined(
@@ -315,6 +328,7 @@ class Formulation:
             own.bodies,
             (*(of_arm(item, n) for item in own.quantities), *several),
             tuple(item.extended(virtual.dof - n) for item in own.curves),
+            own.tool_speed,
         )
 
     def certify(

@@ -14,7 +14,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.planning.nodes.charts import Centred, Charts, Place
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion
+from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion, stepped
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import GAUSS
 
@@ -71,7 +71,7 @@ class Batch:
     @classmethod
     def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Batch":
         """Return the motions of nodes, with costs of those that go on evaluated."""
-        samples, grid, count = motion.samples, motion.grid, len(going)
+        samples, grid, count = motion.sampled.arm, motion.grid, len(going)
         # This also checks the deadline.
         grid.counts.evaluated()
         grid.counts.evaluations += int(going.sum()) - 1
@@ -91,17 +91,17 @@ class Batch:
     @property
     def q(self) -> Array:
         """The motions at their nodes, (K, N + 1, n)."""
-        return self._each(self.motion.place.q)
+        return _each(self, self.motion.place.q)
 
     @property
     def qd(self) -> Array:
         """Joint velocities at the nodes, (K, N + 1, n)."""
-        return self._each(self.motion.place.qd)
+        return _each(self, self.motion.place.qd)
 
     @property
     def qdd(self) -> Array:
         """Joint accelerations at the nodes, (K, N + 1, n)."""
-        return self._each(self.motion.place.qdd)
+        return _each(self, self.motion.place.qdd)
 
     def picked(self, which: Ints) -> "Batch":
         """Return a subset of the motions."""
@@ -156,7 +156,7 @@ class Batch:
         grid.counts.gradients += self.count
         # A gap's slopes may be NaN.
         spline = grid.spline
-        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+        slopes = grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
         slopes[spline.gaps] = 0.0
         force = spline.scattered(slopes)
         around = LocalModel.of(
@@ -168,7 +168,7 @@ class Batch:
         gradient.reshape(-1)[grid.held] = 0.0
         curvature = NodeMatrix.zeros(*gradient.shape)
         by = spline.changes(around.changes)
-        grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+        grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
         matrix = curvature.banded()
         matrix.add(0, 0, around.curvature)
         matrix.hold(grid.held)
@@ -198,7 +198,7 @@ class Batch:
         left, length = going.copy(), most.copy()
         for share in (*_SHARES, 0.0):
             length[left] = share * most[left]
-            found = motion.stepped((length[:, None, None, None] * by_node).reshape(-1, 3 * r))
+            found = stepped(motion, (length[:, None, None, None] * by_node).reshape(-1, 3 * r))
             if found is None:
                 raise RuntimeError(_LEAVES)
             new = Batch._of(found, going & (length > 0.0), promised)
@@ -207,5 +207,6 @@ class Batch:
                 break
         return new
 
-    def _each(self, table: Array) -> Array:
-        return table.reshape(self.count, -1, table.shape[1])
+
+def _each(batch: Batch, table: Array) -> Array:
+    return table.reshape(batch.count, -1, table.shape[1])

@@ -3,7 +3,14 @@
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, kernel
-from selfmotion.planning.nodes.spline import AT_CONTROLS, CONTROLS, ORDERS, Quintic, unit_bases
+from selfmotion.planning.nodes.spline import (
+    AT_CONTROLS,
+    CONTROLS,
+    ORDERS,
+    Quintic,
+    control_times,
+    unit_bases,
+)
 from selfmotion.problem.constraints import BoundLimits, Multipliers
 
 # Rows become active where h is above this [units of h].
@@ -83,7 +90,7 @@ class ControlPointRows:
         once = np.ones(multipliers.shape[:2], dtype=np.bool_)
         if item.order < ORDERS - 1:
             once[:-1, -1] = False
-        times = self._spline.times_of(item.order)[once]
+        times = control_times(self._spline, item.order)[once]
         # The control polygon is outside of the curve.
         at = unit_bases(np.linspace(0.0, 1.0, CONTROLS[item.order]))
         used = self._at(at, ends) > item.granted - _USED
@@ -117,7 +124,7 @@ class ControlPointRows:
         if item.order < ORDERS - 1:
             # The shared control point's, which is not stored here.
             each[:-1, -1] = each[1:, 0]
-        share = (spline.times_of(item.order) - old.t[k][:, None]) / old.steps[k][:, None]
+        share = (control_times(spline, item.order) - old.t[k][:, None]) / old.steps[k][:, None]
         degree = CONTROLS[item.order] - 1
         place = np.clip(np.rint(share * degree), 0, degree).astype(np.int64)
         density = (spline.steps / old.steps[k])[:, None, None, None]

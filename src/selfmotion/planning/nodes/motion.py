@@ -17,10 +17,10 @@ from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.nodes.kernels import follow
 from selfmotion.planning.nodes.objective import NodeCost
-from selfmotion.planning.nodes.rows import NodeRows, is_tolerance, sampled_curve
+from selfmotion.planning.nodes.rows import NodeRows, is_tolerance, parts_wanted, sampled_curve
 from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
-from selfmotion.problem.costs import Partials, Samples
+from selfmotion.problem.costs import Partials
 
 
 class NodeGrid:
@@ -240,26 +240,12 @@ class NodeMotion:
         """Y of each interval, (N, 6, n); see `Quintic`."""
         return self.grid.spline.ends(self.place.nodes)
 
-    @property
-    def centred(self) -> Centred:
-        """The nodes at the reference of their charts."""
-        return Centred(self.charts, self.nu, self.alpha, self.place)
-
-    def _at_gauss(self, order: int) -> Array:
-        n = self.place.q.shape[1]
-        return self.grid.spline.at(AT_GAUSS, order, self.curve_ends).reshape(-1, n)
-
     @cached_property
     def sampled(self) -> SampledMotion:
         """The motion at the Gauss points."""
         grid = self.grid
-        every = CurveSamples(grid.manifolds.follows, grid.spline.sampling, self._at_gauss)
+        every = CurveSamples(grid.manifolds.follows, grid.spline.sampling, partial(_at_gauss, self))
         return grid.formulation.sampled(every)
-
-    @property
-    def samples(self) -> Samples:
-        """The arm's motion at the Gauss points, as costs see it."""
-        return self.sampled.arm
 
     @cached_property
     def checked(self) -> SampledMotion:
@@ -273,7 +259,7 @@ class NodeMotion:
     def terms(self) -> dict[str, float]:
         """Contribution of each cost."""
         self.grid.counts.evaluated()
-        return self.grid.cost.terms(self.samples)
+        return self.grid.cost.terms(self.sampled.arm)
 
     @property
     def cost(self) -> float:
@@ -288,7 +274,7 @@ class NodeMotion:
     @cached_property
     def partials(self) -> tuple[Partials, ...]:
         """Derivatives of each cost's integrand at the samples."""
-        return self.grid.cost.partials(self.samples)
+        return self.grid.cost.partials(self.sampled.arm)
 
     @cached_property
     def h(self) -> Array:
@@ -310,77 +296,6 @@ class NodeMotion:
         """Largest excess of a row over its tolerance [units of h]; 0 where all are satisfied."""
         return float(np.max(self.h - self.grid.rows.granted, initial=0.0))
 
-    def breaks_hard(self, most: float = 0.0) -> bool:
-        """Whether a row that is none of a tolerance is violated by more than `most`."""
-        rows = self.grid.rows
-        beyond = rows.split(self.h - rows.granted)
-        return any(
-            not np.max(own, initial=0.0) <= most
-            for each, own in zip(rows.families, beyond, strict=True)
-            if not is_tolerance(each.item)
-        )
-
-    def can_be_smoothed(self) -> bool:
-        """Whether q̈ may be penalised everywhere, see `smoothing_of`."""
-        return can_be_smoothed(self.grid.formulation, self.samples, self.cost)
-
-    @cached_property
-    def quickness(self) -> float:
-        """Share of the usual time in which it should start and stop, see `quickness`."""
-        return quickness(self.grid.formulation, self.samples, self.cost, self.grid.quick)
-
-    @property
-    def epsilon(self) -> Array:
-        """The null motion ε = N0 ν at the nodes, (N + 1, n)."""
-        return self.charts.spread(self.nu)
-
-    def stepped(self, step: Array) -> "NodeMotion | None":
-        """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none.
-
-        Each node on its own: rates do as the coordinates say, whatever the nodes beside it do.
-        """
-        r = self.nu.shape[1]
-        z, nu, alpha = np.split(step * self.grid.scale, [r, 2 * r], axis=1)
-        epsilon, a = self.charts.spread(self.nu + nu), self.charts.spread(self.alpha + alpha)
-        found = self.charts.centred(z, epsilon, a)
-        return None if found is None else self.grid.at(found)
-
-    def along(self, step: Array, changes: Array) -> "NodeMotion | None":
-        """Return the motion next to where a step leads to first order; None where it is none.
-
-        A step (N + 1, 3r) moves the curve by `changes` (N + 1, 3, n, 3r) times it, which is what
-        linear rows know; from there it comes onto the path by a correction c(t) that is smooth in
-        time. Rates take its derivatives along: where each node's rates were their own, they would
-        contradict the places of those beside it, by the step squared, and the jerk between nodes
-        that are near to each other would be that over the square of the time between them.
-        """
-        grid, nodes, r = self.grid, self.place.nodes, self.nu.shape[1]
-        count, size = step.shape
-        moved = (changes.reshape(count, -1, size) @ step[:, :, None]).reshape(nodes.shape)
-        line, z = nodes + moved, step[:, :r] * grid.scale[:r]
-        q = self.charts.places(z)
-        if q is None:
-            return None
-        rate, bend = grid.spline.differences(q - line[:, 0])
-        qd, qdd = grid.rested(line[:, 1] + rate, 1), grid.rested(line[:, 2] + bend, 2)
-        found = replace(self.charts, q=q).centred(np.zeros_like(z), qd, qdd)
-        return None if found is None else grid.at(found)
-
-    def subdivisions(self) -> Ints:
-        """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
-        grid = self.grid
-        curve = sampled_curve(grid.formulation, grid.spline, self.curve_ends)
-        return grid.rows.subdivisions(curve)
-
-    def broken_intervals(self) -> Flags:
-        """Return on which intervals something is broken between the points, or nearly so, (N,)."""
-        return np.asarray(self.subdivisions() > 1)
-
-    def forget(self) -> None:
-        """Drop cached values."""
-        for name in ("sampled", "checked", "partials", "h", "curve_ends"):
-            self.__dict__.pop(name, None)
-
     @cached_property
     def trajectory(self) -> Trajectory:
         """The motion itself: the quintic through the nodes."""
@@ -388,10 +303,99 @@ class NodeMotion:
         q, qd, qdd = (read_only(x) for x in (place.q, place.qd, place.qdd))
         return Trajectory(self.grid.t, q, qd, names, qdd)
 
-    def on(self, grid: NodeGrid) -> "NodeMotion | None":
-        """Return the motion on other nodes."""
-        own = self.trajectory
-        q, qd, qdd = (own(grid.t, order) for order in range(3))
-        # Approximate bases suffice as a start, and rotate like the ones around.
-        last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
-        return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)
+
+def centred(motion: NodeMotion) -> Centred:
+    """Return the nodes at the reference of their charts."""
+    return Centred(motion.charts, motion.nu, motion.alpha, motion.place)
+
+
+def _at_gauss(motion: NodeMotion, order: int) -> Array:
+    n = motion.place.q.shape[1]
+    return motion.grid.spline.at(AT_GAUSS, order, motion.curve_ends).reshape(-1, n)
+
+
+def breaks_hard(motion: NodeMotion, most: float = 0.0) -> bool:
+    """Whether a row that is none of a tolerance is violated by more than `most`."""
+    rows = motion.grid.rows
+    beyond = rows.split(motion.h - rows.granted)
+    return any(
+        not np.max(own, initial=0.0) <= most
+        for each, own in zip(rows.families, beyond, strict=True)
+        if not is_tolerance(each.item)
+    )
+
+
+def may_be_smoothed(motion: NodeMotion) -> bool:
+    """Whether q̈ may be penalised everywhere, see `smoothing_of`."""
+    return can_be_smoothed(motion.grid.formulation, motion.sampled.arm, motion.cost)
+
+
+def quickness_of(motion: NodeMotion) -> float:
+    """Share of the usual time in which it should start and stop, see `quickness`."""
+    return quickness(motion.grid.formulation, motion.sampled.arm, motion.cost, motion.grid.quick)
+
+
+def null_motion_of(motion: NodeMotion) -> Array:
+    """Return the null motion ε = N0 ν at the nodes, (N + 1, n)."""
+    return motion.charts.spread(motion.nu)
+
+
+def stepped(motion: NodeMotion, step: Array) -> "NodeMotion | None":
+    """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none.
+
+    Each node on its own: rates do as the coordinates say, whatever the nodes beside it do.
+    """
+    r = motion.nu.shape[1]
+    z, nu, alpha = np.split(step * motion.grid.scale, [r, 2 * r], axis=1)
+    epsilon, a = motion.charts.spread(motion.nu + nu), motion.charts.spread(motion.alpha + alpha)
+    found = motion.charts.centred(z, epsilon, a)
+    return None if found is None else motion.grid.at(found)
+
+
+def moved_along(motion: NodeMotion, step: Array, changes: Array) -> "NodeMotion | None":
+    """Return the motion next to where a step leads to first order; None where it is none.
+
+    A step (N + 1, 3r) moves the curve by `changes` (N + 1, 3, n, 3r) times it, which is what
+    linear rows know; from there it comes onto the path by a correction c(t) that is smooth in
+    time. Rates take its derivatives along: where each node's rates were their own, they would
+    contradict the places of those beside it, by the step squared, and the jerk between nodes
+    that are near to each other would be that over the square of the time between them.
+    """
+    grid, nodes, r = motion.grid, motion.place.nodes, motion.nu.shape[1]
+    count, size = step.shape
+    moved = (changes.reshape(count, -1, size) @ step[:, :, None]).reshape(nodes.shape)
+    line, z = nodes + moved, step[:, :r] * grid.scale[:r]
+    q = motion.charts.places(z)
+    if q is None:
+        return None
+    rate, bend = grid.spline.differences(q - line[:, 0])
+    qd, qdd = grid.rested(line[:, 1] + rate, 1), grid.rested(line[:, 2] + bend, 2)
+    found = replace(motion.charts, q=q).centred(np.zeros_like(z), qd, qdd)
+    return None if found is None else grid.at(found)
+
+
+def subdivisions(motion: NodeMotion) -> Ints:
+    """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
+    grid = motion.grid
+    curve = sampled_curve(grid.formulation, grid.spline, motion.curve_ends)
+    return parts_wanted(grid.rows, curve)
+
+
+def broken_intervals(motion: NodeMotion) -> Flags:
+    """Return on which intervals something is broken between the points, or nearly so, (N,)."""
+    return np.asarray(subdivisions(motion) > 1)
+
+
+def forget(motion: NodeMotion) -> None:
+    """Drop cached values."""
+    for name in ("sampled", "checked", "partials", "h", "curve_ends"):
+        motion.__dict__.pop(name, None)
+
+
+def on_grid(motion: NodeMotion, grid: NodeGrid) -> "NodeMotion | None":
+    """Return the motion on other nodes."""
+    own = motion.trajectory
+    q, qd, qdd = (own(grid.t, order) for order in range(3))
+    # Approximate bases suffice as a start, and rotate like the ones around.
+    last = np.searchsorted(motion.grid.t, grid.t, side="right") - 1
+    return grid.around(Charts(grid.manifolds, q, motion.charts.bases[last]), qd, qdd)

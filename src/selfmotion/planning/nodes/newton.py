@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.planning.nodes.motion import NodeMotion
+from selfmotion.planning.nodes.motion import NodeMotion, moved_along
 from selfmotion.planning.nodes.newton_system import Change, ElasticRows, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
@@ -128,35 +128,10 @@ class _Solver:
         self._slacks = self._elastics = self._multipliers = np.zeros(0)
         self._update_active_set()
         if multipliers is not None:
-            self._warm_start(multipliers)
+            _warm_start(self, multipliers)
         self._merit_penalty, self._predicted, self._length, self._shift = 0.0, np.inf, 0.0, 0.0
         self._end_multipliers = np.zeros(start.grid.ends.count)
         self._multiplier_change = np.inf if self._multipliers.size else 0.0
-
-    def _warm_start(self, multipliers: Array) -> None:
-        """Warm start: set s, e, λ and μ by multipliers of all rows, (R,)."""
-        h, known = self._h, multipliers[self._active]
-        usual = self._barrier / np.maximum(-h, SETTINGS.min_slack_warm)
-        self._multipliers = np.clip(np.maximum(known, usual), None, 0.5 * self._rho)
-        slacks = np.maximum(-h, self._barrier / self._multipliers)
-        self._elastics = np.maximum(h + slacks, 0.0) + self._barrier / (
-            self._rho - self._multipliers
-        )
-        self._slacks = np.maximum(slacks, self._elastics - h)
-        # Multipliers of other rows need a larger μ: the mean product with these slacks.
-        product = float(np.mean(self._slacks * self._multipliers)) if len(h) else 0.0
-        most = SETTINGS.mu_first / SETTINGS.mu_warm * self._barrier
-        self._barrier = min(max(self._barrier, product), most)
-
-    def _raise_rho(self) -> bool:
-        """Penalty update: raise ρ where violated rows have multipliers near it; return whether."""
-        saturated = self._multipliers > SETTINGS.saturated * self._rho
-        saturated &= self._h > SETTINGS.violated
-        if self._rho_updates == SETTINGS.max_rho_updates or not saturated.any():
-            return False
-        self._rho_updates += 1
-        self._rho *= SETTINGS.rho_factor
-        return True
 
     @property
     def _h(self) -> Array:
@@ -209,11 +184,11 @@ class _Solver:
             return Status.GRADIENT
         while True:
             step = self._step(system)
-            last = not self._multipliers.size or self._barrier <= self._last_barrier
-            self._multiplier_change = self._relative_change(step.multipliers)
-            converged = last and self._is_converged()
+            last = self._is_last_barrier
+            self._multiplier_change = _relative_change(self, step.multipliers)
+            converged = last and _is_converged(self)
             converged &= self._multiplier_change <= SETTINGS.multiplier_tolerance
-            if (converged or self._is_barrier_solved()) and self._raise_rho():
+            if (converged or _is_barrier_solved(self)) and _raise_rho(self):
                 system = self._system(model)
                 if system is None:
                     return Status.GRADIENT
@@ -221,12 +196,17 @@ class _Solver:
             if converged:
                 self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
-            if last or not self._is_barrier_solved():
+            if last or not _is_barrier_solved(self):
                 return self._move(model, step)
             self._barrier = max(
                 self._last_barrier,
                 min(SETTINGS.kappa_mu * self._barrier, self._barrier**SETTINGS.theta_mu),
             )
+
+    @property
+    def _is_last_barrier(self) -> bool:
+        """Whether μ does not fall any more; without active rows there is no barrier."""
+        return not self._multipliers.size or self._barrier <= self._last_barrier
 
     @property
     def _rows(self) -> ElasticRows:
@@ -255,78 +235,28 @@ class _Solver:
     def _predicts_convergence(self) -> bool:
         """Whether quadratic convergence predicts no further decrease."""
         promised = self._predicted / self._cost_scale
-        full, last = self._length == 1.0, self._barrier <= self._last_barrier
-        if not (full and promised <= SETTINGS.quadratic_share and last):
+        full = self._length == 1.0
+        if not (full and promised <= SETTINGS.quadratic_share and self._is_last_barrier):
             return False
         if self._multiplier_change > np.sqrt(SETTINGS.multiplier_tolerance):
             return False
         before, self._predicted = self._predicted, promised**2 * self._cost_scale
-        if self._is_converged():
+        if _is_converged(self):
             return True
         self._predicted = before
         return False
 
-    def _relative_change(self, step: Array) -> float:
-        """Return the change of the multipliers by a step, relative to their sum."""
-        known = float(self._multipliers.sum()) + SETTINGS.multiplier_floor * self._cost_scale
-        return float(np.abs(step).sum()) / known
-
-    def _is_converged(self) -> bool:
-        """Whether residuals and predicted decrease are within the tolerances."""
-        with_rows = self._multipliers.size > 0
-        tolerance = SETTINGS.cost_tolerance_with_rows if with_rows else SETTINGS.cost_tolerance
-        tolerance *= self._cost_scale
-        factor = SETTINGS.rough_factor if self._rough else 1.0
-        tolerance *= factor
-        met = self._primal_residual <= SETTINGS.row_tolerance * factor
-        met &= bool(np.abs(self.motion.c).max(initial=0.0) <= SETTINGS.end_tolerance)
-        met &= self._complementarity_residual <= SETTINGS.complementarity * self._barrier
-        return bool(met and self._predicted <= tolerance)
-
-    def _is_barrier_solved(self) -> bool:
-        """Whether the barrier problem is solved to κ_ε μ."""
-        allowed = SETTINGS.kappa_epsilon * self._barrier
-        met = self._primal_residual <= SETTINGS.barrier_row_tolerance
-        met &= self._complementarity_residual <= allowed
-        return bool(met and self._predicted <= allowed)
-
-    @property
-    def _primal_residual(self) -> float:
-        """Largest primal residual |h + s - e| of rows with a multiplier that matters."""
-        gap = np.abs(self._residuals)
-        matters = self._multipliers * gap > SETTINGS.inactive_share * self._barrier
-        return float(gap[matters].max(initial=0.0))
-
-    @property
-    def _complementarity_residual(self) -> float:
-        """Largest |s λ - μ| and |e (ρ - λ) - μ|."""
-        by_slack = np.abs(self._slacks * self._multipliers - self._barrier).max(initial=0.0)
-        room = self._elastics * (self._rho - self._multipliers)
-        return float(max(by_slack, np.abs(room - self._barrier).max(initial=0.0)))
-
     def _move(self, model: Model, step: Change) -> Status | None:
         """Line search on the merit function along a step."""
         motion, r = self.motion, step.nodes.shape[1] // 3
-        gap = float(np.abs(motion.c).sum() + np.abs(self._residuals).sum())
-        slope = float((model.gradient * step.nodes).sum()) + float(
-            np.sum(
-                (self._rho - self._barrier / self._elastics) * step.elastics
-                - self._barrier / self._slacks * step.slacks
-            )
-        )
-        if gap > 0.0:
-            # Makes the step a direction of descent of the merit function [NW 18.36].
-            dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
-            self._merit_penalty = max(self._merit_penalty, 2.0 * slope / gap, dearest)
-        self._merit_penalty = max(self._merit_penalty, SETTINGS.min_merit_penalty * self._rho)
-        merit = self._merit(motion, self._slacks, self._elastics)
-        promise = slope - self._merit_penalty * gap
+        promise = _raise_merit_penalty(self, model, step)
+        merit = _merit(self, motion, self._slacks, self._elastics)
         largest = float(np.abs(step.nodes[:, :r]).max())
         length = SETTINGS.max_change / max(largest, SETTINGS.max_change)
         for values, change in ((self._slacks, step.slacks), (self._elastics, step.elastics)):
             length = min(length, _to_boundary(values, change))
         while length >= SETTINGS.min_length:
-            new = motion.along(length * step.nodes, model.around.changes)
+            new = moved_along(motion, length * step.nodes, model.around.changes)
             if new is not None and np.isfinite(new.objective):
                 elastics = self._elastics + length * step.elastics
                 # A gap below 0 closes for nothing; one above costs the penalty, not ρ: else the
@@ -334,7 +264,7 @@ class _Solver:
                 slacks = np.maximum(
                     self._slacks + length * step.slacks, elastics - new.h[self._active]
                 )
-                gained = merit - self._merit(new, slacks, elastics)
+                gained = merit - _merit(self, new, slacks, elastics)
                 # Written so that NaN is rejected; 1e-13 is rounding of the merit.
                 if gained >= -SETTINGS.armijo * length * min(promise, 0.0) - 1e-13 * abs(merit):
                     share = min(
@@ -354,11 +284,100 @@ class _Solver:
         conditions = self._multipliers.size or len(self._end_multipliers)
         return Status.INFEASIBLE if conditions else Status.GRADIENT
 
-    def _merit(self, motion: NodeMotion, slacks: Array, elastics: Array) -> float:
-        barrier = self._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
-        gap = np.abs(motion.h[self._active] + slacks - elastics).sum() + np.abs(motion.c).sum()
-        elastic = self._rho * float(elastics.sum())
-        return motion.objective + elastic - barrier + self._merit_penalty * float(gap)
+
+def _warm_start(solver: _Solver, multipliers: Array) -> None:
+    """Warm start: set s, e, λ and μ by multipliers of all rows, (R,)."""
+    h, known = solver._h, multipliers[solver._active]
+    usual = solver._barrier / np.maximum(-h, SETTINGS.min_slack_warm)
+    solver._multipliers = np.clip(np.maximum(known, usual), None, 0.5 * solver._rho)
+    slacks = np.maximum(-h, solver._barrier / solver._multipliers)
+    solver._elastics = np.maximum(h + slacks, 0.0) + solver._barrier / (
+        solver._rho - solver._multipliers
+    )
+    solver._slacks = np.maximum(slacks, solver._elastics - h)
+    # Multipliers of other rows need a larger μ: the mean product with these slacks.
+    product = float(np.mean(solver._slacks * solver._multipliers)) if len(h) else 0.0
+    most = SETTINGS.mu_first / SETTINGS.mu_warm * solver._barrier
+    solver._barrier = min(max(solver._barrier, product), most)
+
+
+def _raise_rho(solver: _Solver) -> bool:
+    """Penalty update: raise ρ where violated rows have multipliers near it; return whether."""
+    saturated = solver._multipliers > SETTINGS.saturated * solver._rho
+    saturated &= solver._h > SETTINGS.violated
+    if solver._rho_updates == SETTINGS.max_rho_updates or not saturated.any():
+        return False
+    solver._rho_updates += 1
+    solver._rho *= SETTINGS.rho_factor
+    return True
+
+
+def _relative_change(solver: _Solver, step: Array) -> float:
+    """Return the change of the multipliers by a step, relative to their sum."""
+    known = float(solver._multipliers.sum()) + SETTINGS.multiplier_floor * solver._cost_scale
+    return float(np.abs(step).sum()) / known
+
+
+def _is_converged(solver: _Solver) -> bool:
+    """Whether residuals and predicted decrease are within the tolerances."""
+    with_rows = solver._multipliers.size > 0
+    tolerance = SETTINGS.cost_tolerance_with_rows if with_rows else SETTINGS.cost_tolerance
+    tolerance *= solver._cost_scale
+    factor = SETTINGS.rough_factor if solver._rough else 1.0
+    tolerance *= factor
+    met = _primal_residual(solver) <= SETTINGS.row_tolerance * factor
+    met &= bool(np.abs(solver.motion.c).max(initial=0.0) <= SETTINGS.end_tolerance)
+    met &= _complementarity_residual(solver) <= SETTINGS.complementarity * solver._barrier
+    return bool(met and solver._predicted <= tolerance)
+
+
+def _is_barrier_solved(solver: _Solver) -> bool:
+    """Whether the barrier problem is solved to κ_ε μ."""
+    allowed = SETTINGS.kappa_epsilon * solver._barrier
+    met = _primal_residual(solver) <= SETTINGS.barrier_row_tolerance
+    met &= _complementarity_residual(solver) <= allowed
+    return bool(met and solver._predicted <= allowed)
+
+
+def _primal_residual(solver: _Solver) -> float:
+    """Largest primal residual |h + s - e| of rows with a multiplier that matters."""
+    gap = np.abs(solver._residuals)
+    matters = solver._multipliers * gap > SETTINGS.inactive_share * solver._barrier
+    return float(gap[matters].max(initial=0.0))
+
+
+def _complementarity_residual(solver: _Solver) -> float:
+    """Largest |s λ - μ| and |e (ρ - λ) - μ|."""
+    by_slack = np.abs(solver._slacks * solver._multipliers - solver._barrier).max(initial=0.0)
+    room = solver._elastics * (solver._rho - solver._multipliers)
+    return float(max(by_slack, np.abs(room - solver._barrier).max(initial=0.0)))
+
+
+def _raise_merit_penalty(solver: _Solver, model: Model, step: Change) -> float:
+    """Make a step a direction of descent of the merit function; return its derivative along it.
+
+    Along Newton's step residuals close to first order, so that the derivative is that of cost and
+    barrier terms minus ν times all residuals, with the penalty ν [NW 18.36].
+    """
+    slope = float((model.gradient * step.nodes).sum()) + float(
+        np.sum(
+            (solver._rho - solver._barrier / solver._elastics) * step.elastics
+            - solver._barrier / solver._slacks * step.slacks
+        )
+    )
+    gap = float(np.abs(solver.motion.c).sum() + np.abs(solver._residuals).sum())
+    if gap > 0.0:
+        dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
+        solver._merit_penalty = max(solver._merit_penalty, 2.0 * slope / gap, dearest)
+    solver._merit_penalty = max(solver._merit_penalty, SETTINGS.min_merit_penalty * solver._rho)
+    return slope - solver._merit_penalty * gap
+
+
+def _merit(solver: _Solver, motion: NodeMotion, slacks: Array, elastics: Array) -> float:
+    barrier = solver._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
+    gap = np.abs(motion.h[solver._active] + slacks - elastics).sum() + np.abs(motion.c).sum()
+    elastic = solver._rho * float(elastics.sum())
+    return motion.objective + elastic - barrier + solver._merit_penalty * float(gap)
 
 
 def _to_boundary(values: Array, step: Array) -> float:

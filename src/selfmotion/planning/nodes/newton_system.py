@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.ends import Border
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import NodeMotion
+from selfmotion.planning.nodes.motion import NodeMotion, breaks_hard
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.rows import LinearRows
 from selfmotion.planning.nodes.settings import SETTINGS
@@ -87,7 +87,7 @@ class Model(NamedTuple):
         """
         grid, spline = motion.grid, motion.grid.spline
         grid.counts.gradients += 1
-        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+        slopes = grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
         by_cost = spline.scattered(slopes)
         rows = grid.rows.linearised(motion.checked, own.active)
         force, multipliers = by_cost, own.of_all(own.multipliers)
@@ -103,10 +103,10 @@ class Model(NamedTuple):
             return None
         by = spline.changes(around.changes)
         curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
-        grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+        grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
         # Sums of squares keep their curvature however far they are violated; those of tolerances
         # only while other rows hold.
-        without = wild and motion.breaks_hard(SETTINGS.gauss_newton_violation)
+        without = wild and breaks_hard(motion, SETTINGS.gauss_newton_violation)
         grid.rows.add_bending(
             curvature, by, motion.checked, multipliers, without_tolerances=without
         )

@@ -147,11 +147,6 @@ class NodeCost:
             )
         return found
 
-    def _of_bent(self, partials: Sequence[Partials]) -> Partials:
-        """Return the summed derivatives of all costs that are not quadratic forms."""
-        both = zip(self._costs, partials, strict=True)
-        return _summed([own for cost, own in both if not cost.is_quadratic])
-
     def add_curvature(
         self, matrix: NodeMatrix, by: EndChanges, samples: Samples, partials: Sequence[Partials]
     ) -> None:
@@ -160,7 +155,7 @@ class NodeCost:
         for stiffness, weight in self._coupled_forms:
             matrix.add_form(by, stiffness, weight)
         if self._bent:
-            self._add_bending(matrix, by, samples, self._of_bent(partials))
+            self._add_bending(matrix, by, samples, _of_bent(self, partials))
 
     def _add_bending(
         self, matrix: NodeMatrix, by: EndChanges, samples: Samples, here: Partials
@@ -170,82 +165,92 @@ class NodeCost:
         By differences along the self-motion, and by one joint's rate after the other.
         """
         n, weights = self._dof, np.array(samples.weights)
-        along = self._directions(by)
+        along = _directions(self, by)
         own = along[:, :n]
-        moved = self._points(0, along)
-        changed = self._changes(samples, here, [("q", own[:, :, x]) for x in range(own.shape[2])])
+        moved = _points(self, 0, along)
+        changed = _changes(self, samples, here, [("q", own[:, :, x]) for x in range(own.shape[2])])
         if "q" in changed:
             turned = along @ (np.swapaxes(own, 1, 2) @ changed["q"])
-            matrix.add_products(by, moved, self._points(0, turned), weights)
+            matrix.add_products(by, moved, _points(self, 0, turned), weights)
         for order, name in enumerate(_NAMES[1:], 1):
             if name in changed:
-                faster = self._points(order, changed[name])
+                faster = _points(self, order, changed[name])
                 matrix.add_products(by, faster, moved, 2.0 * weights)
         rates = [o for o, name in enumerate(_NAMES) if o and getattr(here, name) is not None]
         units = np.broadcast_to(np.eye(n), (len(samples.t), n, n))
         for order in rates:
             axes = [(_NAMES[order], axis) for axis in np.eye(n)]
-            changed = self._changes(samples, here, axes)
+            changed = _changes(self, samples, here, axes)
             for other in rates:
                 if _NAMES[other] in changed:
                     turned = np.swapaxes(changed[_NAMES[other]], 1, 2)
-                    pair = self._points(other, units), self._points(order, turned)
+                    pair = _points(self, other, units), _points(self, order, turned)
                     matrix.add_products(by, *pair, weights)
 
-    def _points(self, order: int, forms: Array) -> Points:
-        """Return linear forms (S, n, p) of a derivative at the samples."""
-        table = np.ascontiguousarray(AT_GAUSS[order])
-        return Points(table, self._spline.rates(order), np.ascontiguousarray(forms))
 
-    def _directions(self, by: EndChanges) -> Array:
-        """Return orthonormal self-motion directions at the samples, (S, n, r).
+def _of_bent(cost: NodeCost, partials: Sequence[Partials]) -> Partials:
+    """Return the summed derivatives of all costs that are not quadratic forms."""
+    both = zip(cost._costs, partials, strict=True)
+    return _summed([own for cost, own in both if not cost.is_quadratic])
 
-        Interpolated between the nodes.
-        """
-        spline, (count, _, n, size) = self._spline, by.nodes.shape
-        each = by.nodes[:, 0, :, : size // 3]
-        left, right = each[:-1, None], each[1:, None]
-        share = GAUSS[:, None, None]
-        found = left + share * (right - left)
-        found[spline.gaps] = np.eye(n)[:, : size // 3]
-        return orthonormal(found.reshape((count - 1) * len(GAUSS), n, -1))
 
-    def _changes(
-        self, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
-    ) -> dict[str, Array]:
-        """Return changes of non-quadratic costs' derivatives `here` in directions, (S, n, D) each.
+def _points(cost: NodeCost, order: int, forms: Array) -> Points:
+    """Return linear forms (S, n, p) of a derivative at the samples."""
+    table = np.ascontiguousarray(AT_GAUSS[order])
+    return Points(table, cost._spline.rates(order), np.ascontiguousarray(forms))
 
-        A direction is of q or one of its rates, (S, n) or (n,). Several are evaluated in one pass
-        where there are few samples.
-        """
-        together = max(1, _TOGETHER // len(samples.t))
-        found: dict[str, list[Array]] = {}
-        for first in range(0, len(directions), together):
-            for name, part in self._changed(
-                samples, here, directions[first : first + together]
-            ).items():
-                found.setdefault(name, []).append(part)
-        return {name: np.concatenate(parts, axis=2) for name, parts in found.items()}
 
-    def _changed(
-        self, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
-    ) -> dict[str, Array]:
-        """Return the result of `_changes`, all directions in one pass."""
-        count, copies = len(samples.t), len(directions)
-        flat = {name: np.tile(getattr(samples, name), (copies, 1)) for name in _NAMES}
-        for k, (name, direction) in enumerate(directions):
-            flat[name][k * count : (k + 1) * count] += _NEAR * direction
-        t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
-        sampling = Sampling(t, weights, np.arange(len(t)))
-        shifted = PlacedLater(self._follows, sampling, **flat)
-        there = _summed([cost.gradient(shifted) for cost in self._bent])
-        parts = {}
-        for name in _NAMES:
-            before, after = getattr(here, name), getattr(there, name)
-            if before is not None and after is not None:
-                change = (after.reshape(copies, count, -1) - before) / _NEAR
-                parts[name] = np.moveaxis(change, 0, 2)
-        return parts
+def _directions(cost: NodeCost, by: EndChanges) -> Array:
+    """Return orthonormal cost-motion directions at the samples, (S, n, r).
+
+    Interpolated between the nodes.
+    """
+    spline, (count, _, n, size) = cost._spline, by.nodes.shape
+    each = by.nodes[:, 0, :, : size // 3]
+    left, right = each[:-1, None], each[1:, None]
+    share = GAUSS[:, None, None]
+    found = left + share * (right - left)
+    found[spline.gaps] = np.eye(n)[:, : size // 3]
+    return orthonormal(found.reshape((count - 1) * len(GAUSS), n, -1))
+
+
+def _changes(
+    cost: NodeCost, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
+) -> dict[str, Array]:
+    """Return changes of non-quadratic costs' derivatives `here` in directions, (S, n, D) each.
+
+    A direction is of q or one of its rates, (S, n) or (n,). Several are evaluated in one pass
+    where there are few samples.
+    """
+    together = max(1, _TOGETHER // len(samples.t))
+    found: dict[str, list[Array]] = {}
+    for first in range(0, len(directions), together):
+        for name, part in _changed(
+            cost, samples, here, directions[first : first + together]
+        ).items():
+            found.setdefault(name, []).append(part)
+    return {name: np.concatenate(parts, axis=2) for name, parts in found.items()}
+
+
+def _changed(
+    cost: NodeCost, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
+) -> dict[str, Array]:
+    """Return the result of `_changes`, all directions in one pass."""
+    count, copies = len(samples.t), len(directions)
+    flat = {name: np.tile(getattr(samples, name), (copies, 1)) for name in _NAMES}
+    for k, (name, direction) in enumerate(directions):
+        flat[name][k * count : (k + 1) * count] += _NEAR * direction
+    t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
+    sampling = Sampling(t, weights, np.arange(len(t)))
+    shifted = PlacedLater(cost._follows, sampling, **flat)
+    there = _summed([cost.gradient(shifted) for cost in cost._bent])
+    parts = {}
+    for name in _NAMES:
+        before, after = getattr(here, name), getattr(there, name)
+        if before is not None and after is not None:
+            change = (after.reshape(copies, count, -1) - before) / _NEAR
+            parts[name] = np.moveaxis(change, 0, 2)
+    return parts
 
 
 def _is_diagonal(weight: Array) -> bool:

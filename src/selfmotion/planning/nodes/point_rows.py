@@ -9,7 +9,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.planning.formulation import SampledMotion
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
-from selfmotion.planning.nodes.spline import ORDERS, Quintic
+from selfmotion.planning.nodes.spline import ORDERS, Quintic, point_shares
 from selfmotion.problem.constraints import (
     BoundConstraint,
     Multipliers,
@@ -139,7 +139,7 @@ class CollocationRows:
     def linearised(self, motion: SampledMotion, active: Flags) -> PointRows:
         """Return the derivatives of the active rows."""
         which = np.flatnonzero(active)
-        intervals, shares = self._spline.point_shares(which // self.count if which.size else which)
+        intervals, shares = point_shares(self._spline, which // self.count if which.size else which)
         found = np.zeros((len(which), 6, self._dof))
         if which.size:
             samples = motion.seen_by(self.item)
@@ -157,7 +157,7 @@ class CollocationRows:
             return
         slopes = np.sqrt(np.abs(multipliers))[:, :1, None] * slopes
         points, which = np.nonzero(slopes.any(axis=2))
-        intervals, shares = self._spline.point_shares(points)
+        intervals, shares = point_shares(self._spline, points)
         rows = np.zeros((len(points), 6, self._dof))
         rows[:, :, self._columns] = shares[:, 0, :, None] * slopes[points, which][:, None, :]
         PointRows(intervals, rows).add_squared(matrix, by, np.ones(len(points)))

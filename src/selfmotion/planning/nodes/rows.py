@@ -137,17 +137,6 @@ class NodeRows:
             if own.any() and not (without_tolerances and is_tolerance(rows.item)):
                 rows.add_bending(matrix, by, motion, own)
 
-    def multipliers_of(self, multipliers: Array, ends: Array) -> list[Multipliers]:
-        """Return the multipliers by constraint, in the order of time, for those of all (R,)."""
-        limits, points = self.by_kind(multipliers)
-        return [
-            *(
-                rows.multipliers_of(own, ends)
-                for rows, own in zip(self.limits, limits, strict=True)
-            ),
-            *(rows.multipliers_of(own) for rows, own in zip(self.points, points, strict=True)),
-        ]
-
     @cached_property
     def granted(self) -> Array:
         """Tolerance of each row that is not used, (R,)."""
@@ -157,53 +146,66 @@ class NodeRows:
         ]
         return np.concatenate([np.zeros(0), *each])
 
-    def conservatism(self, multipliers: Array, ends: Array) -> Array:
-        """Return a bound of the decrease of F if limits applied to the curve itself, (N,).
 
-        To first order: multipliers times the distance of the control points from the curve.
-        """
-        found = np.zeros(self.spline.count)
-        for rows, own in zip(self.limits, self.by_kind(multipliers)[0], strict=True):
-            if own.any():
-                found += rows.conservatism(own, ends)
-        return found
+def multipliers_of(every: NodeRows, multipliers: Array, ends: Array) -> list[Multipliers]:
+    """Return the multipliers by constraint, in the order of time, for those of all (R,)."""
+    limits, points = every.by_kind(multipliers)
+    return [
+        *(rows.multipliers_of(own, ends) for rows, own in zip(every.limits, limits, strict=True)),
+        *(rows.multipliers_of(own) for rows, own in zip(every.points, points, strict=True)),
+    ]
 
-    def subdivisions(self, curve: SampledMotion) -> Ints:
-        """Return the number of parts of each interval that rows of points need, (N,).
 
-        For the curve of `sampled_curve`: 1 where constraints are within their tolerances between
-        the points as well. An excess over that at the points falls with the square of the parts.
-        Where one interval has to be divided, so is one that is nearly violated: on the next nodes
-        it would be.
-        """
-        found = np.ones(self.spline.count, dtype=np.int64)
-        for rows in self.points:
-            found = np.maximum(found, rows.subdivisions(curve))
-        return found
+def conservatism(every: NodeRows, multipliers: Array, ends: Array) -> Array:
+    """Return a bound of the decrease of F if limits applied to the curve itself, (N,).
 
-    def kinks(self, ends: Array) -> Flags:
-        """Return the mask of intervals next to which limits of q̈ or jerk start to bind, (N,)."""
-        found = np.zeros(self.spline.count, dtype=np.bool_)
-        for rows in self.limits:
-            if rows.item.order > 1:
-                found |= rows.kinks(ends)
-        return found
+    To first order: multipliers times the distance of the control points from the curve.
+    """
+    found = np.zeros(every.spline.count)
+    for rows, own in zip(every.limits, every.by_kind(multipliers)[0], strict=True):
+        if own.any():
+            found += rows.conservatism(own, ends)
+    return found
 
-    def carried(self, before: "NodeRows", multipliers: Array) -> Array:
-        """Return the multipliers of these rows, (R,), by those of the nearest rows before."""
-        limits, points = before.by_kind(multipliers)
-        found = [
-            np.zeros(0),
-            *(
-                rows.carried(old, own).ravel()
-                for rows, old, own in zip(self.limits, before.limits, limits, strict=True)
-            ),
-            *(
-                rows.carried(old, own).ravel()
-                for rows, old, own in zip(self.points, before.points, points, strict=True)
-            ),
-        ]
-        return np.concatenate(found)
+
+def parts_wanted(every: NodeRows, curve: SampledMotion) -> Ints:
+    """Return the number of parts of each interval that rows of points need, (N,).
+
+    For the curve of `sampled_curve`: 1 where constraints are within their tolerances between
+    the points as well. An excess over that at the points falls with the square of the parts.
+    Where one interval has to be divided, so is one that is nearly violated: on the next nodes
+    it would be.
+    """
+    found = np.ones(every.spline.count, dtype=np.int64)
+    for rows in every.points:
+        found = np.maximum(found, rows.subdivisions(curve))
+    return found
+
+
+def kinks(every: NodeRows, ends: Array) -> Flags:
+    """Return the mask of intervals next to which limits of q̈ or jerk start to bind, (N,)."""
+    found = np.zeros(every.spline.count, dtype=np.bool_)
+    for rows in every.limits:
+        if rows.item.order > 1:
+            found |= rows.kinks(ends)
+    return found
+
+
+def carried(every: NodeRows, before: "NodeRows", multipliers: Array) -> Array:
+    """Return the multipliers of these rows, (R,), by those of the nearest rows before."""
+    limits, points = before.by_kind(multipliers)
+    found = [
+        np.zeros(0),
+        *(
+            rows.carried(old, own).ravel()
+            for rows, old, own in zip(every.limits, before.limits, limits, strict=True)
+        ),
+        *(
+            rows.carried(old, own).ravel()
+            for rows, old, own in zip(every.points, before.points, points, strict=True)
+        ),
+    ]
+    return np.concatenate(found)
 
 
 def sampled_curve(formulation: Formulation, spline: Quintic, ends: Array) -> SampledMotion:

@@ -147,11 +147,6 @@ class Quintic:
         first, second = (shares[:, :, None, :] @ x[which])[:, :, 0]
         return first, second
 
-    def times_of(self, order: int) -> Array:
-        """Return the times of the control points [s], (N, 6 - o)."""
-        shares = np.linspace(0.0, 1.0, CONTROLS[order])
-        return np.asarray(self.t[:-1, None] + self.steps[:, None] * shares)
-
     def ends(self, nodes: Array) -> Array:
         """Return y of each interval, (N, 6, n), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
         found = np.concatenate([nodes[:-1], nodes[1:]], axis=1) * self._powers[:, :, None]
@@ -198,15 +193,22 @@ class Quintic:
         last = AT_END[order] @ ends[-1] * self.rates(order)[-1]
         return np.concatenate([inner, last])
 
-    def point_shares(self, which: Ints) -> tuple[Ints, Array]:
-        """Return the intervals of some points (R,), and q … jerk there as matrices of y.
 
-        (R,) and (R, 4, 6).
-        """
-        count = len(self._shares)
-        last = which == count * self.count
-        k = np.where(last, self.count - 1, which // count)
-        tables = np.stack([*self._at_points], axis=1)[which % count]
-        tables[last] = np.stack([table[0] for table in AT_END])
-        powers = self.steps[k][:, None] ** -np.arange(float(ORDERS))
-        return k, tables * powers[:, :, None]
+def control_times(spline: Quintic, order: int) -> Array:
+    """Return the times of the control points [s], (N, 6 - o)."""
+    shares = np.linspace(0.0, 1.0, CONTROLS[order])
+    return np.asarray(spline.t[:-1, None] + spline.steps[:, None] * shares)
+
+
+def point_shares(spline: Quintic, which: Ints) -> tuple[Ints, Array]:
+    """Return the intervals of some points (R,), and q … jerk there as matrices of y.
+
+    (R,) and (R, 4, 6).
+    """
+    count = len(spline._shares)
+    last = which == count * spline.count
+    k = np.where(last, spline.count - 1, which // count)
+    tables = np.stack([*spline._at_points], axis=1)[which % count]
+    tables[last] = np.stack([table[0] for table in AT_END])
+    powers = spline.steps[k][:, None] ** -np.arange(float(ORDERS))
+    return k, tables * powers[:, :, None]

@@ -13,7 +13,10 @@ from selfmotion.planning.paper.minimum_norm import (
     Start as Start,
     converged_minimum_norm as converged_minimum_norm,
 )
-from selfmotion.planning.paper.objective import Objective as Objective
+from selfmotion.planning.paper.objective import (
+    Objective as Objective,
+    node_tangents as node_tangents,
+)
 from selfmotion.planning.paper.rollout import Rollout as Rollout
 from selfmotion.planning.paper.solution import (
     Method as Method,

@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.planning.optimise import inverse_metric
-from selfmotion.planning.paper.objective import Objective
+from selfmotion.planning.paper.objective import Objective, residual_tangents, residuals
 
 # Residual at which conditions are met [rad, rad/s, rad/s²] …
 _CLOSED = 1e-11
@@ -50,7 +50,7 @@ def closed(objective: Objective, x: Array) -> Array:
         Its cost is finite.
     """
     for _ in range(_ROUNDS):
-        x, residual_size, _ = Eliminated(objective, x).newton(x, _HALVINGS)
+        x, residual_size, _ = newton(Eliminated(objective, x), x, _HALVINGS)
         if residual_size < _MET:
             break
     return x
@@ -72,7 +72,7 @@ class Eliminated:
         self._objective, self._reference = objective, reference
         values, vectors = np.linalg.eigh(inverse_metric(_metric(objective), _FLAT))
         root, inward = vectors * np.sqrt(values), (vectors / np.sqrt(values)).T
-        rows = objective.residual_tangents(reference) @ root
+        rows = residual_tangents(objective, reference) @ root
         sizes = np.linalg.norm(rows, axis=1, keepdims=True)
         sizes[sizes == 0.0] = 1.0
         left, singular, right = np.linalg.svd(rows / sizes)
@@ -99,8 +99,8 @@ class Eliminated:
         """Return x at y, (size of x,), or the nearest to it that Newton's method came to."""
         if self._at is None or not np.array_equal(self._at, y):
             self._at = None
-            self._x, self._residual_size, self._taken = self.newton(
-                self._reference + self._along @ y
+            self._x, self._residual_size, self._taken = newton(
+                self, self._reference + self._along @ y
             )
             self._at = y.copy()
         return self._x
@@ -135,7 +135,7 @@ class Eliminated:
 
     def tangent(self, y: Array) -> Array:
         """Return dx/dy, (size of x, size)."""
-        rows = self._rows(self.point(y))
+        rows = _rows(self, self.point(y))
         responses = np.linalg.lstsq(rows @ self._across, rows @ self._along)[0]
         return np.asarray(self._along - self._across @ responses)
 
@@ -148,38 +148,41 @@ class Eliminated:
         tangent = self.tangent(y)
         return np.asarray(tangent @ inverse_hessian @ tangent.T)
 
-    def newton(self, x: Array, halvings: int = 1) -> tuple[Array, float, int]:
-        """Return the result of Newton's method along U, its residual, and the number of steps.
 
-        The residual is infinite where there is no motion.
-        """
-        residual, taken = self._residual(x), 0
-        while taken < _STEPS and _CLOSED <= _size(residual) < np.inf:
-            # A motion near breakdown has derivatives that overflow.
-            with np.errstate(over="ignore", invalid="ignore"):
-                table = self._rows(x) @ self._across
-            if not np.all(np.isfinite(table)):
+def newton(function: Eliminated, x: Array, halvings: int = 1) -> tuple[Array, float, int]:
+    """Return the result of Newton's method along U, its residual, and the number of steps.
+
+    The residual is infinite where there is no motion.
+    """
+    residual, taken = _residual(function, x), 0
+    while taken < _STEPS and _CLOSED <= _size(residual) < np.inf:
+        # A motion near breakdown has derivatives that overflow.
+        with np.errstate(over="ignore", invalid="ignore"):
+            table = _rows(function, x) @ function._across
+        if not np.all(np.isfinite(table)):
+            break
+        step = -function._across @ np.linalg.lstsq(table, residual)[0]
+        for halving in range(halvings):
+            nearer = x + 0.5**halving * step
+            left = _residual(function, nearer)
+            # Slow convergence counts as failure.
+            if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(residual):
                 break
-            step = -self._across @ np.linalg.lstsq(table, residual)[0]
-            for halving in range(halvings):
-                nearer = x + 0.5**halving * step
-                left = self._residual(nearer)
-                # Slow convergence counts as failure.
-                if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(residual):
-                    break
-            else:
-                break
-            x, residual, taken = nearer, left, taken + 1
-        return x, _size(residual), taken
+        else:
+            break
+        x, residual, taken = nearer, left, taken + 1
+    return x, _size(residual), taken
 
-    def _residual(self, x: Array) -> Array:
-        count = len(self._counted)
-        if not np.isfinite(self._objective.value(x)):
-            return np.full(count, np.inf)
-        return np.asarray(self._counted @ self._objective.residuals(x))
 
-    def _rows(self, x: Array) -> Array:
-        return np.asarray(self._counted @ self._objective.residual_tangents(x))
+def _residual(function: Eliminated, x: Array) -> Array:
+    count = len(function._counted)
+    if not np.isfinite(function._objective.value(x)):
+        return np.full(count, np.inf)
+    return np.asarray(function._counted @ residuals(function._objective, x))
+
+
+def _rows(function: Eliminated, x: Array) -> Array:
+    return np.asarray(function._counted @ residual_tangents(function._objective, x))
 
 
 def _metric(objective: Objective) -> Array:

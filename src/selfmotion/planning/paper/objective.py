@@ -247,7 +247,7 @@ class Objective:
 
     def value(self, x: Array) -> float:
         """Return the cost at x; infinite where the motion breaks down."""
-        self._run(x)
+        _run(self, x)
         return total if np.isfinite(total := sum(self._terms.values())) else np.inf
 
     def gradient(self, x: Array) -> Array:
@@ -255,40 +255,11 @@ class Objective:
 
         Exact for the discretised motion; NaN where it breaks down.
         """
-        self._run(x)
+        _run(self, x)
         if self._gradient is None:
             self.counts.gradients += 1
-            self._gradient = self._pulled_back(x)
+            self._gradient = _pulled_back(self, x)
         return self._gradient.copy()
-
-    def _pulled_back(self, x: Array) -> Array:
-        if not np.isfinite(self.value(x)):
-            return np.full(self.size, np.nan)
-        by_epsilon, by_start = self.rollout.pullback(
-            *self._costs.cotangents(self.rollout.samples())
-        )
-        return np.concatenate(
-            [by_start @ self.start.tangent(), self.null_motion.pullback(by_epsilon)]
-        )
-
-    def require_finite(self, x: Array) -> None:
-        """Raise an error that says why and when F is not finite at x, where it is not.
-
-        Raises
-        ------
-        BreakdownError
-            Its motion breaks down.
-        ProblemError
-            A cost has no finite value.
-        """
-        samples = self.samples(x)
-        if self._broken is not None:
-            raise BreakdownError(
-                f"{self.rollout.robot.name}: eq. 4 breaks down near t = {self._broken:.4g} s, "
-                f"where the tool reaches a singular pose",
-                time=self._broken,
-            )
-        require_finite_values(self._all_costs, samples)
 
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
@@ -296,17 +267,17 @@ class Objective:
 
     def terms(self, x: Array) -> dict[str, float]:
         """Return the contribution of each cost to F at x."""
-        self._run(x)
+        _run(self, x)
         return dict(self._terms)
 
     def samples(self, x: Array) -> Samples:
         """Return the motion of x at the stages; its arrays are those of the next run, too."""
-        self._run(x)
+        _run(self, x)
         return self.rollout.samples()
 
     def at(self, x: Array) -> Evaluation:
         """Return the motion of x with its costs."""
-        self._run(x)
+        _run(self, x)
         if self._evaluation is None:
             before = self.rollout.jacobian_evaluations
             t, q, qd = self.rollout.polished()
@@ -320,26 +291,6 @@ class Objective:
             self._evaluation = Evaluation(x.copy(), terms, trajectory, self.rollout.damped)
         return self._evaluation
 
-    def residuals(self, x: Array) -> Array:
-        """Return c at x of E conditions on the ends, (E,): 0 where they are met."""
-        samples = self.samples(x)
-        return np.concatenate(
-            [np.zeros(0), *(item.residual(samples).ravel() for item in self.ends)]
-        )
-
-    def residual_tangents(self, x: Array) -> Array:
-        """Return ∂c/∂x at x, (E, size)."""
-        motion, samples, rows = self.node_tangents(x), self.samples(x), [np.zeros((0, self.size))]
-        for item in self.ends:
-            known = linearised(item, samples, motion)
-            rows.append(known.picked(motion, np.arange(known.count)))
-        return np.concatenate(rows)
-
-    def unmet(self, x: Array) -> tuple[str, ...]:
-        """Return the violated conditions on ends at x, in words."""
-        samples = self.samples(x)
-        return violated((item, samples) for item in self.ends)
-
     def metric(self, x: Array) -> Array:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).
 
@@ -347,58 +298,124 @@ class Objective:
         (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error. Its inverse starts the
         quasi-Newton method.
         """
-        by_q, by_qd = self._sensitivities(x)
-        return self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(by_q))
+        by_q, by_qd = _sensitivities(self, x)
+        return self._costs.curvature(by_q, by_qd, lambda: _error_tangent(self, by_q))
 
-    def node_tangents(self, x: Array) -> NodeTangents:
-        """Return the derivatives of the motion at the nodes by the decision vector, at x."""
-        by_q, by_qd = self._sensitivities(x)
-        sampling = self.grid.sampling
-        return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
 
-    def _error_tangent(self, by_q: Array) -> Array:
-        """Return ∂(S e)/∂x = -J ∂q/∂x, (S, m, size).
+def _pulled_back(objective: Objective, x: Array) -> Array:
+    if not np.isfinite(objective.value(x)):
+        return np.full(objective.size, np.nan)
+    by_epsilon, by_start = objective.rollout.pullback(
+        *objective._costs.cotangents(objective.rollout.samples())
+    )
+    return np.concatenate(
+        [by_start @ objective.start.tangent(), objective.null_motion.pullback(by_epsilon)]
+    )
 
-        Nothing on the path, where the self-motion does not move the tool.
-        """
-        return np.asarray(-(self.rollout.samples().task_jacobian @ by_q))
 
-    def _run(self, x: Array) -> None:
-        """Make x the motion that the rollout holds."""
-        if self._at is not None and np.array_equal(self._at, x):
-            return
-        self.counts.evaluated()
-        # An interruption must not leave half a motion as that of x.
-        self._at = self._tangents = self._gradient = self._evaluation = None
-        self._terms = dict.fromkeys(self._costs.names, np.inf)
-        before = self.rollout.jacobian_evaluations
-        try:
-            self._evaluate(x)
-        finally:
-            self.counts.jacobians += self.rollout.jacobian_evaluations - before
-        self._at = x.copy()
+def require_finite_at(objective: Objective, x: Array) -> None:
+    """Raise an error that says why and when F is not finite at x, where it is not.
 
-    def _evaluate(self, x: Array) -> None:
-        z, coefficients = self.parts(x)
-        start = self.start.configuration(z, self._first)
-        self._broken = 0.0 if start is None else None
-        if start is None:
-            return
-        is_rolled, self._is_rolled = self._is_rolled and not x.any(), False
-        if not is_rolled:
-            self._broken = self.rollout.run(start, self.null_motion.epsilon(coefficients))
-        if self._broken is not None:
-            return
-        self._terms = self._costs.values(self.rollout.samples())
+    Raises
+    ------
+    BreakdownError
+        Its motion breaks down.
+    ProblemError
+        A cost has no finite value.
+    """
+    samples = objective.samples(x)
+    broken = objective._broken
+    if broken is not None:
+        raise BreakdownError(
+            f"{objective.rollout.robot.name}: eq. 4 breaks down near t = {broken:.4g} s, where "
+            f"the tool reaches a singular pose",
+            time=broken,
+        )
+    require_finite_values(objective._all_costs, samples)
 
-    def _sensitivities(self, x: Array) -> tuple[Array, Array]:
-        """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
-        self._run(x)
-        if self._tangents is not None:
-            return self._tangents
-        first = self.start.size
-        epsilon_matrix = self.null_motion.matrix(first)
-        start_matrix = np.zeros((epsilon_matrix.shape[1], self.size))
-        start_matrix[:, :first] = self.start.tangent()
-        self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix)
-        return self._tangents
+
+def residuals(objective: Objective, x: Array) -> Array:
+    """Return c at x of E conditions on the ends, (E,): 0 where they are met."""
+    samples = objective.samples(x)
+    return np.concatenate(
+        [np.zeros(0), *(item.residual(samples).ravel() for item in objective.ends)]
+    )
+
+
+def residual_tangents(objective: Objective, x: Array) -> Array:
+    """Return ∂c/∂x at x, (E, size)."""
+    motion, samples, rows = (
+        node_tangents(objective, x),
+        objective.samples(x),
+        [np.zeros((0, objective.size))],
+    )
+    for item in objective.ends:
+        known = linearised(item, samples, motion)
+        rows.append(known.picked(motion, np.arange(known.count)))
+    return np.concatenate(rows)
+
+
+def unmet(objective: Objective, x: Array) -> tuple[str, ...]:
+    """Return the violated conditions on ends at x, in words."""
+    samples = objective.samples(x)
+    return violated((item, samples) for item in objective.ends)
+
+
+def node_tangents(objective: Objective, x: Array) -> NodeTangents:
+    """Return the derivatives of the motion at the nodes by the decision vector, at x."""
+    by_q, by_qd = _sensitivities(objective, x)
+    sampling = objective.grid.sampling
+    return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
+
+
+def _error_tangent(objective: Objective, by_q: Array) -> Array:
+    """Return ∂(S e)/∂x = -J ∂q/∂x, (S, m, size).
+
+    Nothing on the path, where the objective-motion does not move the tool.
+    """
+    return np.asarray(-(objective.rollout.samples().task_jacobian @ by_q))
+
+
+def _run(objective: Objective, x: Array) -> None:
+    """Make x the motion that the rollout holds."""
+    if objective._at is not None and np.array_equal(objective._at, x):
+        return
+    objective.counts.evaluated()
+    # An interruption must not leave half a motion as that of x.
+    objective._at = objective._tangents = objective._gradient = objective._evaluation = None
+    objective._terms = dict.fromkeys(objective._costs.names, np.inf)
+    before = objective.rollout.jacobian_evaluations
+    try:
+        _evaluate(objective, x)
+    finally:
+        objective.counts.jacobians += objective.rollout.jacobian_evaluations - before
+    objective._at = x.copy()
+
+
+def _evaluate(objective: Objective, x: Array) -> None:
+    z, coefficients = objective.parts(x)
+    start = objective.start.configuration(z, objective._first)
+    objective._broken = 0.0 if start is None else None
+    if start is None:
+        return
+    is_rolled, objective._is_rolled = objective._is_rolled and not x.any(), False
+    if not is_rolled:
+        objective._broken = objective.rollout.run(
+            start, objective.null_motion.epsilon(coefficients)
+        )
+    if objective._broken is not None:
+        return
+    objective._terms = objective._costs.values(objective.rollout.samples())
+
+
+def _sensitivities(objective: Objective, x: Array) -> tuple[Array, Array]:
+    """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
+    _run(objective, x)
+    if objective._tangents is not None:
+        return objective._tangents
+    first = objective.start.size
+    epsilon_matrix = objective.null_motion.matrix(first)
+    start_matrix = np.zeros((epsilon_matrix.shape[1], objective.size))
+    start_matrix[:, :first] = objective.start.tangent()
+    objective._tangents = objective.rollout.sensitivities(epsilon_matrix, start_matrix)
+    return objective._tangents

@@ -41,7 +41,7 @@ class Rollout:
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(follows.duration)
         self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
-        self._space = np.zeros(kernels.space_size(*self._sizes[:2]))
+        self._space = np.zeros(kernels.space_size(*_sizes(self)[:2]))
         # Cached values of the last run.
         self._samples: Samples | None = None
         # Work space of `polished`: one stage, at a node.
@@ -50,12 +50,8 @@ class Rollout:
             self.aim(item.target(grid.stage_times), f)
         self._at.step[:, 0] = grid.stage_steps
 
-    @property
-    def _sizes(self) -> tuple[int, int, int]:
-        return self.follows.dof, self.follows.dimension, len(self.follows.items)
-
     def _new_table(self, stages: int) -> tuple[Array, kernels.Stage, list[kernels.Tip]]:
-        n, m, count = self._sizes
+        n, m, count = _sizes(self)
         table = np.zeros((stages, kernels.columns(n, m, count)))
         tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
         return table, kernels.stage_of(table, n, m), tips
@@ -111,36 +107,20 @@ class Rollout:
         q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
-        nearer = q + _correction(run.task_jacobian[here], self._wrong(self._tips, here))
+        nearer = q + _correction(run.task_jacobian[here], _wrong(self, self._tips, here))
         for i, stage in enumerate(here):
             self._node_table[0] = self._table[stage]
             node.q[0] = nearer[i]
             for _ in range(_POLISHING_STEPS):
                 if self._advance(self._node_table, node.q, 0.0) is not None:
                     break
-                left = self._wrong(self._node_tips, np.zeros(1, dtype=np.intp))
+                left = _wrong(self, self._node_tips, np.zeros(1, dtype=np.intp))
                 q[i], qd[i] = node.q[0], node.qd[0]
                 if np.abs(left).max() < _POLISHED:
                     break
                 node.q[0] += _correction(node.task_jacobian, left)[0]
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
-
-    def _wrong(self, tips: list[kernels.Tip], stages: Ints) -> Array:
-        """Return the pose errors in the prescribed rows at some stages (K,), (K, m, 1)."""
-        parts = [
-            item.task.select_along(tip.error[stages, :, None], tip.rotation[stages])
-            for item, tip in zip(self.follows.items, tips, strict=True)
-        ]
-        return np.concatenate(parts, axis=1)
-
-    @property
-    def _last_run(
-        self,
-    ) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
-        """Arguments of the last run for kernels that differentiate it."""
-        columns = self.follows.every_column(self._at.q)
-        return self._table, self.follows.layout, self._gain, self._law, columns, self._space
 
     def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
@@ -155,7 +135,7 @@ class Rollout:
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
-            *self._last_run,
+            *_last_run(self),
             np.zeros((len(self._tips), 6)),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
@@ -163,12 +143,6 @@ class Rollout:
             by_qd,
         )
         return by_q, by_qd
-
-    def _by_tip(self, table: Array) -> Array:
-        """Return a table (S, k F, …) as one for each tip, (S, F, k, …)."""
-        count, columns = len(self._tips), table.shape[1]
-        shape = (len(table), count, columns // count, *table.shape[2:])
-        return np.ascontiguousarray(table).reshape(shape)
 
     @property
     def first_target(self) -> Array:
@@ -236,19 +210,54 @@ class Rollout:
         start_gradient : (n,)
             ∂F/∂q(0).
         """
-        count, (n, _, tips) = len(self._table), self._sizes
+        count, (n, _, tips) = len(self._table), _sizes(self)
         epsilon_gradient, start_gradient = np.empty((count, n)), np.empty(n)
         if error_cotangent is None:
             error_cotangent = np.zeros((count, 6 * tips))
         kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
-            self._by_tip(error_cotangent),
-            *self._last_run,
+            _by_tip(self, error_cotangent),
+            *_last_run(self),
             epsilon_gradient,
             start_gradient,
         )
         return epsilon_gradient, start_gradient
+
+
+def _sizes(rollout: Rollout) -> tuple[int, int, int]:
+    return rollout.follows.dof, rollout.follows.dimension, len(rollout.follows.items)
+
+
+def _wrong(rollout: Rollout, tips: list[kernels.Tip], stages: Ints) -> Array:
+    """Return the pose errors in the prescribed rows at some stages (K,), (K, m, 1)."""
+    parts = [
+        item.task.select_along(tip.error[stages, :, None], tip.rotation[stages])
+        for item, tip in zip(rollout.follows.items, tips, strict=True)
+    ]
+    return np.concatenate(parts, axis=1)
+
+
+def _last_run(
+    rollout: Rollout,
+) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
+    """Arguments of the last run for kernels that differentiate it."""
+    columns = rollout.follows.every_column(rollout._at.q)
+    return (
+        rollout._table,
+        rollout.follows.layout,
+        rollout._gain,
+        rollout._law,
+        columns,
+        rollout._space,
+    )
+
+
+def _by_tip(rollout: Rollout, table: Array) -> Array:
+    """Return a table (S, k F, …) as one for each tip, (S, F, k, …)."""
+    count, columns = len(rollout._tips), table.shape[1]
+    shape = (len(table), count, columns // count, *table.shape[2:])
+    return np.ascontiguousarray(table).reshape(shape)
 
 
 def _correction(jacobians: Array, errors: Array) -> Array:

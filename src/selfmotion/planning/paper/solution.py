@@ -29,7 +29,7 @@ from selfmotion.planning.optimise import (
 )
 from selfmotion.planning.paper.ends import Eliminated, closed
 from selfmotion.planning.paper.minimum_norm import MOST_HALVINGS, MinimumNormMotion
-from selfmotion.planning.paper.objective import Objective
+from selfmotion.planning.paper.objective import Objective, require_finite_at, unmet
 from selfmotion.problem.constraints import BoundConstraint
 
 # Relative agreement of the cost on a grid and on the halved one.
@@ -183,7 +183,7 @@ class Solution:
     @cached_property
     def unmet(self) -> tuple[str, ...]:
         """Violated conditions on ends, in words."""
-        return self.objective.unmet(self.x)
+        return unmet(self.objective, self.x)
 
     @property
     def evaluation(self) -> Evaluation:
@@ -263,7 +263,7 @@ class Solution:
     def _on(self, objective: Objective) -> Self:
         """Return it with another objective of the same unknowns, with its ends met."""
         if not np.isfinite(objective.value(self.x)):
-            objective.require_finite(self.x)
+            require_finite_at(objective, self.x)
         x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
         return replace(self, objective=objective, x=x)
 

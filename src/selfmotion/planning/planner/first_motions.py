@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import BoundConditions
-from selfmotion.planning.nodes import NodeGrid, NodeMotion, minimise
+from selfmotion.planning.nodes import NodeGrid, NodeMotion, centred, minimise, on_grid
 from selfmotion.planning.planner.outcomes import is_kept, rank_of
 from selfmotion.planning.planner.recorder import Recorder
 from selfmotion.problem.costs import Cost, JointAcceleration, JointJerk
@@ -42,13 +42,13 @@ def smoothest(begun: NodeMotion, recorder: Recorder) -> Iterator[NodeMotion]:
         counts, free = begun.grid.counts, begun.grid.free
         grid = NodeGrid(formulation, motion.grid.t, ends, free=free, counts=counts)
         found = minimise(
-            grid.at(motion.centred), recorder.note, roughly=True, max_iterations=FEWER_ITERATIONS
+            grid.at(centred(motion)), recorder.note, roughly=True, max_iterations=FEWER_ITERATIONS
         )
-        motion = motion.grid.at(found.motion.centred)
+        motion = motion.grid.at(centred(found.motion))
         if is_kept(motion) or number == _SMOOTHING_ROUNDS - 1:
             yield motion
             return
-        finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
+        finer = on_grid(motion, motion.grid.on(Grid(motion.grid.t).halved().nodes))
         if finer is None:
             return
         motion = finer

@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model.motion import FreeNullMotion, Grid
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes import NodeMotion, rest_times
+from selfmotion.planning.nodes import NodeMotion, on_grid, rest_times
 from selfmotion.planning.planner.effort import Effort
 
 # Intervals of the first nodes for each reach of the arm that the tool moves, and at least.
@@ -109,5 +109,5 @@ def rough_grid(formulation: Formulation) -> Grid:
 
 def resolves(motion: NodeMotion) -> bool:
     """Whether a motion costs about the same on twice as many nodes."""
-    finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
+    finer = on_grid(motion, motion.grid.on(Grid(motion.grid.t).halved().nodes))
     return finer is not None and abs(finer.cost - motion.cost) <= ABOUT_AS_GOOD * abs(finer.cost)

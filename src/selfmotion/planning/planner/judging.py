@@ -11,6 +11,7 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import MOST_HALVINGS
 from selfmotion.planning.planner.largest_part import Part
+from selfmotion.planning.planner.refinement import refined
 from selfmotion.planning.planner.solution import Solution, have_one_start
 from selfmotion.planning.planner.solve import kept_off_itself, settle, solve_again
 
@@ -56,80 +57,122 @@ class Judged:
 
 def judge(formulation: Formulation, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
     """Return the motion on the first grid on which it is within the tolerance, with its check."""
-    judged: Judged | None = None
-    coarse: Trajectory | None = None
-    misses: list[float] = []
-    roughs, first = 0, part.solution.outcome.steps
-    for _ in range(MOST_HALVINGS):
-        try:
-            progress("checking", 1, 1)
-            judged = _check(formulation, part, tolerance)
-            part = judged.part
-            if _meets_itself(formulation, judged.certificate):
-                apart = kept_off_itself(part.solution)
-                if apart is not None and apart.outcome is not part.solution.outcome:
-                    part = replace(part, solution=settle(apart))
-                    continue
-                if apart is not None:
-                    # That it was tried, and how that ended, is known from now on.
-                    part = replace(part, solution=apart)
-                    judged = replace(judged, part=part)
-            rough = _rough(formulation, judged)
-            roughs += rough
-            solution = part.solution
-            # Where no evaluations are left, finer grids change nothing.
-            out = solution.status is Status.MAX_EVALUATIONS
-            spent = out or roughs > _ROUGH_GRIDS or solution.outcome.steps > _FINER * first
-            if judged.certificate.on_path and (spent or not rough):
-                break
-            trajectory = judged.motion.trajectory
-            # The path error of damping is the same on any grid: the grid is fine when the tool's
-            # motion is.
-            if coarse is not None and _same(formulation, coarse, trajectory, tolerance):
-                break
-            coarse = trajectory if judged.motion.damped else None
-            # Poses out of reach are so on any grid.
-            check = judged.certificate
-            misses.append(check.position_error.value + check.rotation_error.value)
-            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
-                break
-            if solution.outcome.steps >= solution.most_steps:
-                break
-            solution = solution.refined()
-            if rough and not solution.cut_short:
-                solution = solve_again(solution)
-            part = replace(part, solution=solution)
-        except KeyboardInterrupt:
-            part = replace(part, solution=part.solution.ended_by(Status.INTERRUPTED))
-            if judged is not None:
-                judged = replace(judged, part=part)
-            break
+    by = _ByCertificate(formulation, part, tolerance, progress)
+    try:
+        refined(part, by)
+    except KeyboardInterrupt:
+        by.part = replace(by.part, solution=by.part.solution.ended_by(Status.INTERRUPTED))
+        if by.judged is not None:
+            return replace(by.judged, part=by.part)
     # No plan goes without a certificate, interrupted or not.
-    return judged or _check(formulation, part, tolerance)
+    return by.judged or _check(formulation, by.part, tolerance)
 
 
-def _resolved(
-    formulation: Formulation, solution: Solution, tolerance: Tolerance
-) -> tuple[Solution, Evaluation]:
-    """Return the motion, steps halved between whose nodes the tool was off the path."""
-    allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
-    motion = solution.evaluation
-    for _ in range(MOST_HALVINGS):
-        errors = formulation.errors_between(motion.trajectory) / allowed
+class _ByCertificate:
+    """Judges parts by their certificate, and halves their steps where finer ones may do.
+
+    Attributes
+    ----------
+    part : Part
+        The last one.
+    judged : Judged or None
+        The last one that has a certificate.
+    """
+
+    def __init__(
+        self, formulation: Formulation, part: Part, tolerance: Tolerance, progress: Progress
+    ) -> None:
+        self._formulation, self._tolerance, self._progress = formulation, tolerance, progress
+        self._first, self._rounds, self._roughs = part.solution.outcome.steps, MOST_HALVINGS, 0
+        self._coarse: Trajectory | None = None
+        self._misses: list[float] = []
+        self.part = part
+        self.judged: Judged | None = None
+
+    def __call__(self, part: Part) -> Part | None:
+        """Return the part on a finer grid; None where it is verified, or no finer one will do."""
+        if self._rounds == 0:
+            return None
+        self._rounds -= 1
+        self._progress("checking", 1, 1)
+        judged = self.judged = _check(self._formulation, part, self._tolerance)
+        part = self.part = judged.part
+        if _meets_itself(self._formulation, judged.certificate):
+            apart = kept_off_itself(part.solution)
+            if apart is not None and apart.outcome is not part.solution.outcome:
+                self.part = replace(part, solution=settle(apart))
+                return self.part
+            if apart is not None:
+                # That it was tried, and how that ended, is known from now on.
+                part = self.part = replace(part, solution=apart)
+                judged = self.judged = replace(judged, part=part)
+        rough = _rough(self._formulation, judged)
+        if self._is_enough(judged, rough):
+            return None
+        solution = part.solution.refined()
+        if rough and not solution.cut_short:
+            solution = solve_again(solution)
+        self.part = replace(part, solution=solution)
+        return self.part
+
+    def _is_enough(self, judged: Judged, rough: bool) -> bool:
+        """Whether nothing is wrong, or nothing that a finer grid would change."""
+        self._roughs += rough
+        solution, check = judged.part.solution, judged.certificate
+        # Where no evaluations are left, finer grids change nothing.
+        out = solution.status is Status.MAX_EVALUATIONS
+        spent = out or self._roughs > _ROUGH_GRIDS
+        spent = spent or solution.outcome.steps > _FINER * self._first
+        if check.on_path and (spent or not rough):
+            return True
+        trajectory, coarse = judged.motion.trajectory, self._coarse
+        # The path error of damping is the same on any grid: the grid is fine when the tool's
+        # motion is.
+        if coarse is not None and _same(self._formulation, coarse, trajectory, self._tolerance):
+            return True
+        self._coarse = trajectory if judged.motion.damped else None
+        # Poses out of reach are so on any grid.
+        misses = self._misses
+        misses.append(check.position_error.value + check.rotation_error.value)
+        if self._coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+            return True
+        return solution.outcome.steps >= solution.most_steps
+
+
+class _ByPath:
+    """Judges solutions by the path between their nodes, and halves the steps that are off it.
+
+    Attributes
+    ----------
+    motion : Evaluation
+        Of the last one.
+    """
+
+    motion: Evaluation
+
+    def __init__(self, formulation: Formulation, tolerance: Tolerance) -> None:
+        self._formulation, self._rounds, self._worst = formulation, MOST_HALVINGS, np.inf
+        self._allowed = np.array([tolerance.position, tolerance.rotation])
+
+    def __call__(self, solution: Solution) -> Solution | None:
+        """Return the motion on a finer grid; None where it is near the path, or comes no nearer."""
+        motion = self.motion = solution.evaluation
+        if self._rounds == 0:
+            return None
+        self._rounds -= 1
+        errors = self._formulation.errors_between(motion.trajectory) / self._allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < _FALLS * before or len(errors) > solution.most_steps
+        stuck = not worst < _FALLS * self._worst or len(errors) > solution.most_steps
         if motion.damped or worst <= _RESOLVED or stuck:
-            break
-        before = worst
-        solution = solution.refined((errors > _RESOLVED).any(axis=1))
-        motion = solution.evaluation
-    return solution, motion
+            return None
+        self._worst = worst
+        return solution.refined((errors > _RESOLVED).any(axis=1))
 
 
 def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
-    """Whether self-collision, under the default clearance, is the only violation."""
-    is_default = formulation.problem.own_collision is not None and len(certificate.failures) == 1
+    """Whether self-collision, which was not looked at before, is the only violation."""
+    is_default = formulation.no_overlap is not None and len(certificate.failures) == 1
     return is_default and not certificate.findings[-1].satisfied
 
 
@@ -140,8 +183,8 @@ def _rough(formulation: Formulation, judged: Judged) -> bool:
     is_default = {item.name for item in formulation.problem.requirements}
     # The arm's own limits always apply.
     is_default |= set(LIMIT_NAMES[:2])
-    if formulation.problem.own_collision is not None:
-        # The default clearance need not have been a constraint of the nodes.
+    if formulation.no_overlap is not None:
+        # It need not have been a constraint of the nodes.
         is_default.discard(formulation.problem.requirements[-1].name)
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
@@ -169,10 +212,11 @@ def _same(
 
 
 def _check(formulation: Formulation, part: Part, tolerance: Tolerance) -> Judged:
-    solution, motion = _resolved(formulation, part.solution, tolerance)
-    certificate = formulation.certify(motion.trajectory, tolerance, part.ending)
+    by = _ByPath(formulation, tolerance)
+    solution = refined(part.solution, by)
+    certificate = formulation.certify(by.motion.trajectory, tolerance, part.ending)
     resolved = replace(part, solution=solution)
-    return Judged(resolved, motion, solution.minimum_norm_evaluation, certificate)
+    return Judged(resolved, by.motion, solution.minimum_norm_evaluation, certificate)
 
 
 def refined_both(

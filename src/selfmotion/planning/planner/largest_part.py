@@ -210,8 +210,7 @@ def _until(formulation: Formulation, time: float) -> Formulation:
     """Return the problem on [0, time], without conditions on the end."""
     if time >= formulation.path.duration:
         return formulation
-    parts = (item.on_part() for item in formulation.problem.constraints)
-    remaining = [item for item in parts if item is not None]
+    remaining = [item for item in formulation.problem.constraints if not item.ends.is_about(1)]
     shorter = formulation.along(
         lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
     )

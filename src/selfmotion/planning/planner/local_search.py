@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
-from selfmotion.planning.nodes import NodeGrid, NodeMotion, Optimum, minimise
+from selfmotion.planning.nodes import NodeGrid, NodeMotion, Optimum, centred, minimise, on_grid
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Effort
@@ -151,20 +151,20 @@ class LocalSearch:
 
     def with_more(self, known: NodeOutcome) -> NodeOutcome | None:
         """Return the best motion near one with fewer conditions, the first of these, or None."""
-        motion = self.grid(known.motion.grid.t).at(known.motion.centred)
+        motion = self.grid(known.motion.grid.t).at(centred(known.motion))
         more = len(motion.h) - len(known.multipliers)
         found = self.best_near(motion, multipliers=np.append(known.multipliers, np.zeros(more)))
         return None if found is None or found.violations else found
 
     def _freely(self, motion: NodeMotion) -> Optimum:
         """Return the optimum near a motion without conditions but those on ends and tolerances."""
-        alone = motion.grid.without_rows().at(motion.centred)
+        alone = motion.grid.without_rows().at(centred(motion))
         # Whether these keep the conditions is not known.
         return minimise(alone, self.recorder.note, roughly=True)
 
     def _other(self, begun: NodeMotion, first: Optimum, free: Optimum | None) -> Optimum:
         """Return the best of the optima from other beginnings, the first, and the free one."""
-        open_one = begun.grid.at((free or self._freely(begun)).motion.centred)
+        open_one = begun.grid.at(centred((free or self._freely(begun)).motion))
         ends, none = begun.grid.ends.count, np.zeros(len(open_one.h))
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
         rank = partial(_rank, begun=begun)
@@ -191,7 +191,7 @@ class LocalSearch:
             own for rest, own in zip(self.formulation.problem.rests, ends, strict=True) if rest
         ]
         finer = np.unique(np.concatenate([Grid(t).halved().nodes, *beside]))
-        motion = optimum.motion.on(optimum.motion.grid.on(finer))
+        motion = on_grid(optimum.motion, optimum.motion.grid.on(finer))
         return optimum if motion is None else self.minimise(motion)
 
     def again(self, known: NodeOutcome, *, roughly: bool = False) -> NodeOutcome | None:

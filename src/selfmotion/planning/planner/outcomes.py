@@ -15,7 +15,18 @@ from selfmotion.planning.formulation import (
     Formulation,
     SampledMotion,
 )
-from selfmotion.planning.nodes import NodeMotion, Optimum
+from selfmotion.planning.nodes import (
+    NodeMotion,
+    Optimum,
+    carried,
+    conservatism,
+    forget,
+    may_be_smoothed,
+    multipliers_of,
+    null_motion_of,
+    on_grid,
+    quickness_of,
+)
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import MinimumNormMotion
 from selfmotion.planning.planner.grids import UNKEPT
@@ -235,7 +246,7 @@ class NodeOutcome:
         """Return the one at an optimum."""
         motion: NodeMotion = optimum.motion
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        away = motion.grid.rows.conservatism(optimum.multipliers, motion.curve_ends)
+        away = conservatism(motion.grid.rows, optimum.multipliers, motion.curve_ends)
         return cls(motion, status, optimum.multipliers, promised + float(away.sum()), optimum)
 
     @property
@@ -300,7 +311,7 @@ class NodeOutcome:
         """The motion with its costs."""
         motion = self.motion
         found = Evaluation(_coefficients(motion), motion.terms, motion.trajectory, damped=False)
-        motion.forget()
+        forget(motion)
         return found
 
     def on(self, t: Array) -> "NodeOutcome | None":
@@ -310,12 +321,14 @@ class NodeOutcome:
         """
         beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
         beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
-        smoothed, quick = self.motion.can_be_smoothed(), self.motion.quickness
+        smoothed, quick = may_be_smoothed(self.motion), quickness_of(self.motion)
         for times in (t, beside):
-            motion = self.motion.on(self.motion.grid.on(times, smoothed=smoothed, quick=quick))
+            motion = on_grid(
+                self.motion, self.motion.grid.on(times, smoothed=smoothed, quick=quick)
+            )
             if motion is not None:
-                multipliers = motion.grid.rows.carried(self.motion.grid.rows, self.multipliers)
-                self.motion.forget()
+                multipliers = carried(motion.grid.rows, self.motion.grid.rows, self.multipliers)
+                forget(self.motion)
                 return replace(self, motion=motion, multipliers=multipliers)
         return None
 
@@ -331,7 +344,7 @@ def on_the_way(motion: NodeMotion, status: Status = Status.STOPPED) -> NodeOutco
 
 def _coefficients(motion: NodeMotion) -> Array:
     """Return the null motion at the nodes, joint by joint."""
-    return np.asarray(motion.epsilon.T.ravel())
+    return np.asarray(null_motion_of(motion).T.ravel())
 
 
 Outcome = MinimumNormOutcome | PublishedOutcome | NodeOutcome
@@ -343,7 +356,7 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     if not (optimum.multipliers.any() or optimum.end_multipliers.size):
         return ()
     motion, grid = optimum.motion, optimum.motion.grid
-    each = grid.rows.multipliers_of(optimum.multipliers, motion.curve_ends)
+    each = multipliers_of(grid.rows, optimum.multipliers, motion.curve_ends)
     ends = grid.ends.by_item(optimum.end_multipliers)
     for item in grid.conditions.ends:
         own = ends[id(item)][None]

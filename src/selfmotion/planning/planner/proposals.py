@@ -27,7 +27,7 @@ from selfmotion.basics import (
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes import NodeGrid, NodeMotion
+from selfmotion.planning.nodes import NodeGrid, NodeMotion, broken_intervals
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
 from selfmotion.planning.planner.guess import Guess, on_start
@@ -327,7 +327,7 @@ def along_chain(guess: Guess, guide: Sequence) -> NodeOutcome | None:
         motion = _through(grid, q)
         if motion is None:
             return None
-        broken = motion.broken_intervals() | _beyond_limits(motion)
+        broken = broken_intervals(motion) | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(len(motion.h))
             return NodeOutcome(motion, Status.PRECISION, none, is_chain=True)

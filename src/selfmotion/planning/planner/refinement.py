@@ -1,11 +1,21 @@
-"""How fine the nodes of an optimum have to be."""
+"""Finer grids: the one loop of refinement, and its judge by what nodes know."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from selfmotion.basics import Array, Ints
-from selfmotion.planning.nodes import NodeMotion
+from selfmotion.planning.nodes import (
+    NodeMotion,
+    broken_intervals,
+    centred,
+    conservatism,
+    kinks,
+    quickness_of,
+    subdivisions,
+)
 from selfmotion.planning.planner.grids import NOTHING, most_nodes, with_starts
 from selfmotion.planning.planner.local_search import LocalSearch
 from selfmotion.planning.planner.outcomes import NodeOutcome, is_kept
@@ -26,50 +36,88 @@ _EXTRA_CLEARANCE = (5e-4, 1e-3, 2e-3)
 _PAYS = 3e-4
 
 
+_Found = TypeVar("_Found")
+
+
+def refined(found: _Found, divide: Callable[[_Found], _Found | None]) -> _Found:
+    """Return what is found on grids so fine that a judge has nothing to divide.
+
+    The one loop of refinement: a judge returns what it is given on a finer grid, divided where it
+    is worst and solved there, or None where finer grids change nothing. `DividesAtNodes` judges by
+    what the nodes know; `judging` by the path between them, and by the certificate.
+    """
+    while (finer := divide(found)) is not None:
+        found = finer
+    return found
+
+
 def settled(search: LocalSearch, known: NodeOutcome) -> NodeOutcome:
     """Return the optimum on nodes so near to each other that more change nothing.
 
     The curve is on its path between them, control points give hardly anything away, and what
     holds at points holds between them.
     """
-    found = _resolved(search, known)
+    found = refined(known, DividesAtNodes(search))
     return _farther_apart(search, found) or found
 
 
-def _resolved(search: LocalSearch, known: NodeOutcome) -> NodeOutcome:
-    """Return the optimum on nodes so near to each other that more change nothing, if it may."""
-    before, most, is_rough = np.inf, most_nodes(search.formulation), True
-    for _ in range(_NODE_ROUNDS):
-        if search.recorder.ended is not None:
-            break
-        t = _finer(search, known)
-        if before - known.cost > _PAYS * abs(known.cost):
-            # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
-            # there, while it pays.
-            kinks, before = _at_kinks(known.motion), known.cost
-            if kinks is not None:
-                t = kinks if t is None else np.union1d(t, kinks)
-        finer = None if t is None or len(t) > most else known.on(t)
+class DividesAtNodes:
+    """Judges optima by what their nodes know, and optimises them on more where that pays.
+
+    Parameters
+    ----------
+    search : LocalSearch
+    """
+
+    def __init__(self, search: LocalSearch) -> None:
+        self._search, self._most = search, most_nodes(search.formulation)
+        self._cost, self._is_rough, self._rounds = np.inf, True, _NODE_ROUNDS
+
+    def __call__(self, known: NodeOutcome) -> NodeOutcome | None:
+        """Return the optimum on more nodes, or the last one; None where it may not, or need not."""
+        search = self._search
+        if self._rounds == 0 or search.recorder.ended is not None:
+            return None
+        self._rounds -= 1
+        t = self._wanted(known)
+        finer = None if t is None or len(t) > self._most else known.on(t)
         polishes = finer is None
-        if polishes and not is_rough:
-            break
+        if polishes and not self._is_rough:
+            return None
         found = search.again(finer or known, roughly=not polishes)
         if found is None:
-            break
+            return None
         gains = known.cost - found.cost > NOTHING * abs(known.cost)
         if not (found.has_arrived or gains) and search.recorder.ended is None:
-            # More nodes lead nowhere, and multipliers on the way say nothing.
-            again = None if polishes else search.again(known)
-            if again is not None and again.has_arrived:
-                return again
-            # Between few nodes it may be off the path: there, what is on the way will do.
-            errors = search.formulation.errors_between(known.motion.trajectory)
-            off = not polishes and again is None and errors.max() > _NEAR_PATH
-            return found if off else known
+            self._rounds = 0
+            return self._without_more(known, found, polishes)
         gained = max(known.cost - found.cost, 0.0)
-        remaining = (found.remaining or 0.0) + gained
-        known, is_rough = replace(found, remaining=remaining), not polishes
-    return known
+        self._is_rough = not polishes
+        return replace(found, remaining=(found.remaining or 0.0) + gained)
+
+    def _wanted(self, known: NodeOutcome) -> Array | None:
+        """Return times of nodes near enough to each other, or None where these are."""
+        t = _finer(self._search, known)
+        if self._cost - known.cost > _PAYS * abs(known.cost):
+            # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
+            # there, while it pays.
+            kinks, self._cost = _at_kinks(known.motion), known.cost
+            if kinks is not None:
+                return kinks if t is None else np.union1d(t, kinks)
+        return t
+
+    def _without_more(self, known: NodeOutcome, found: NodeOutcome, polishes: bool) -> NodeOutcome:
+        """Return the last optimum where more nodes lead nowhere.
+
+        Multipliers on the way say nothing.
+        """
+        again = None if polishes else self._search.again(known)
+        if again is not None and again.has_arrived:
+            return again
+        # Between few nodes it may be off the path: there, what is on the way will do.
+        errors = self._search.formulation.errors_between(known.motion.trajectory)
+        off = not polishes and again is None and errors.max() > _NEAR_PATH
+        return found if off else known
 
 
 def _farther_apart(search: LocalSearch, known: NodeOutcome) -> NodeOutcome | None:
@@ -82,15 +130,15 @@ def _farther_apart(search: LocalSearch, known: NodeOutcome) -> NodeOutcome | Non
     own = grid.conditions
     has_bodies = any(item.stricter(0.0) is not None for item in own.points)
     if search.recorder.ended is not None or not (
-        has_bodies and known.motion.broken_intervals().any()
+        has_bodies and broken_intervals(known.motion).any()
     ):
         return None
     for far in _EXTRA_CLEARANCE:
         points = tuple(item.stricter(far) or item for item in own.points)
         stricter = grid.with_conditions(own._replace(points=points))
-        optimum = search.minimise(stricter.at(known.motion.centred))
-        found = replace(optimum, motion=grid.at(optimum.motion.centred))
-        if is_kept(found.motion) and not found.motion.broken_intervals().any():
+        optimum = search.minimise(stricter.at(centred(known.motion)))
+        found = replace(optimum, motion=grid.at(centred(optimum.motion)))
+        if is_kept(found.motion) and not broken_intervals(found.motion).any():
             return search.outcome(found)
     return None
 
@@ -104,14 +152,14 @@ def _finer(search: LocalSearch, known: NodeOutcome) -> Array | None:
     wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
     parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
     parts = np.clip(parts, 1.0, _MOST_PARTS).astype(int)
-    away = grid.rows.conservatism(known.multipliers, motion.curve_ends)
+    away = conservatism(grid.rows, known.multipliers, motion.curve_ends)
     least = NOTHING * abs(motion.objective)
     if away.sum() > least:
         parts[(away > least / spline.count) & (parts == 1)] = 2
-    parts = np.maximum(parts, motion.subdivisions())
+    parts = np.maximum(parts, subdivisions(motion))
     t = spline.t if (parts == 1).all() else _divided(spline.t, parts)
-    if motion.quickness < grid.quick:
-        t = with_starts(search.formulation, t, motion.quickness)
+    if quickness_of(motion) < grid.quick:
+        t = with_starts(search.formulation, t, quickness_of(motion))
     return t if len(t) > len(spline.t) else None
 
 
@@ -125,7 +173,7 @@ def _divided(t: Array, parts: Ints) -> Array:
 
 def _at_kinks(motion: NodeMotion) -> Array | None:
     """Return times with more nodes where limits of q̈ or jerk begin or end to bind, or None."""
-    where = motion.grid.rows.kinks(motion.curve_ends)
+    where = kinks(motion.grid.rows, motion.curve_ends)
     if not where.any():
         return None
     wide = np.convolve(where, np.ones(3), "same") > 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Progress
 from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes import Batch, NodeMotion, minimise
+from selfmotion.planning.nodes import Batch, NodeMotion, breaks_hard, minimise
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import ABOUT_AS_GOOD, resolves
 from selfmotion.planning.planner.rough import (
@@ -214,7 +214,7 @@ class Ranking:
                 return []
             # One without progress may improve as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
-            if stuck or motion.breaks_hard():
+            if stuck or breaks_hard(motion):
                 others.append(motion)
             elif self._rough.is_clear(motion):
                 feasible.append(motion)

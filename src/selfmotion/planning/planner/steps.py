@@ -18,6 +18,7 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
+from selfmotion.certificate import arm_limits
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Search
@@ -43,7 +44,6 @@ from selfmotion.planning.planner.verdicts import (
 )
 from selfmotion.planning.result import Attempt
 from selfmotion.planning.search import Obstruction, obstruction
-from selfmotion.problem.constraints import JointPositionLimits
 
 _WHERE_IT_BREAKS = "starts where it breaks"
 
@@ -425,7 +425,7 @@ def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
     blocked = obstruction(formulation, np.random.default_rng(search.rng))
     if blocked is None:
         return None
-    if blocked.is_met and formulation.problem.own_collision is not None:
+    if blocked.is_met and formulation.no_overlap is not None:
         return blocked
     if blocked.is_met or blocked.time == 0.0:
         raise _obstruction_error(formulation, blocked)
@@ -435,7 +435,8 @@ def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
 def _is_in_own_reach(formulation: Formulation, pose: SE3) -> bool:
     """Whether required limits, and not the arm's own, exclude a pose."""
     problem = formulation.problem
-    if not any(isinstance(item, JointPositionLimits) for item in formulation.problem.constraints):
+    if any(item.order == 0 for item in arm_limits(problem.robot, problem.requirements)):
+        # Nothing is asked of positions, but what the arm's own limits are.
         return False
     try:
         problem.robot.inverse_kinematics(pose, problem.task)

@@ -56,7 +56,6 @@ from selfmotion.planning.result.specification import (
     described as described,
     elsewhere as elsewhere,
     gaps as gaps,
-    keeps_as_far as keeps_as_far,
     moving_end as moving_end,
     not_judged_by as not_judged_by,
 )

@@ -31,7 +31,8 @@ from selfmotion.model.motion import NullMotion, Trajectory
 from selfmotion.model.robot import RobotModel, mesh_digests
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.result.report import FUNCTION, Attempt, Gap, Report
-from selfmotion.problem.constraints import ActiveConstraint, Clearance, Constraint
+from selfmotion.problem.constraints import ActiveConstraint, Clearance, Constraint, said_once
+from selfmotion.problem.problem.digest import conditions_digest
 from selfmotion.problem.problem.problem import Problem
 from selfmotion.problem.problem.saved_problem import problem_from_dict, problem_to_dict
 
@@ -151,14 +152,12 @@ def files_of(
     own = f"meshes of {robot.urdf.sha256} in {robot.urdf.package_dirs}"
     if own not in known:
         known[own] = mesh_digests(robot.urdf, "collision")
-    bodies = (body for item in constraints for body in _bodies(item, robot))
+    apart, others = said_once(constraints, None)[::-1]
+    # Not by the requirement of a clearance, which makes bodies: a good part of a second.
+    bodies = [body for item in apart for body in item.obstacles]
+    bodies += [body for item in others for body in item.requirement(robot).obstacles]
     given = {str(file): digest_of_file(file) for body in bodies for file in body.files}
     return {**known[own], **given}
-
-
-def _bodies(item: Constraint, robot: RobotModel) -> Iterator[Obstacle]:
-    # Its requirement makes bodies, which takes a good part of a second.
-    yield from item.obstacles if isinstance(item, Clearance) else item.requirement(robot).obstacles
 
 
 class ArmCache(dict[str, Any]):
@@ -384,11 +383,32 @@ def _restore(
         ActiveConstraint(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
         for item in report["active"]
     )
+    problem = problem_from_dict(description["problem"], known)
     return Archive(
-        problem=problem_from_dict(description["problem"], known),
+        problem=problem,
         trajectory=trajectory_of(arrays, names),
         initial_trajectory=trajectory_of(arrays, names, "initial_"),
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
-        certificate=_certificate_from_dict(description["certificate"]),
+        certificate=_known_again(
+            _certificate_from_dict(description["certificate"]), problem, description["problem"]
+        ),
     )
+
+
+def _known_again(
+    certificate: Certificate, problem: Problem, described: Mapping[str, Any]
+) -> Certificate:
+    """Return a certificate with the digest of its problem as it is by now.
+
+    Former versions had clearances among the constraints, and a digest in the order of these.
+    """
+    kinds = [item["kind"] for item in described["constraints"]]
+    if Clearance.kind not in kinds:
+        return certificate
+    apart, others = iter(problem.clearances), iter(problem.constraints)
+    former = [next(apart if kind == Clearance.kind else others) for kind in kinds]
+    applying = [item for item in (*former, *apart) if item.applies(problem.robot)]
+    if certificate.problem != conditions_digest(problem, applying):
+        return certificate
+    return dataclasses.replace(certificate, problem=problem.digest)

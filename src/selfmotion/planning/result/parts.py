@@ -370,14 +370,13 @@ class PartsAsked:
         else:
             path, relaxed = problem.path, tuple(problem.relaxations)
             constraints = tuple(problem.constraints)
-        own = problem.own_collision
-        kept = [item for item in constraints if item.applies(problem.robot)]
+        wanted = (*constraints, *problem.clearances)
         asked = MotionSpecification(
             problem.robot,
             path,
             problem.task,
             relaxed,
-            (*kept, *([] if own is None else [own])),
+            tuple(item for item in wanted if item.applies(problem.robot)),
             tolerance=self._parts.tolerance,
             also=problem.also,
             rest=problem.rest and problem.damping is None,
@@ -397,13 +396,12 @@ class PartsAsked:
         if len(moves) != wanted:
             yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"
             return
-        own = problem.own_collision
-        asked = [*at_all_times(problem.constraints), *([] if own is None else [own])]
+        asked = (*at_all_times(problem.constraints), *problem.clearances)
+        kept = [item for item in asked if item.applies(problem.robot)]
         for number, move in enumerate(moves, 1):
             for text in another_tool(move.robot, problem.robot):
                 yield f"move {number}: {text}"
             if move.trajectory is not None:
-                kept = [item for item in asked if item.applies(problem.robot)]
                 for text in not_judged_by(move.constraints, kept, None):
                     yield f"move {number}: {text}"
         pieces = []

@@ -294,14 +294,14 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         return np.where(times <= 0.0, 0.0, late)
 
     # A plan of a part has no conditions on the end.
-    asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
+    asked = [item for item in old.constraints if not (plan.report.ending and item.ends.is_about(1))]
     problem = replace(
         old,
         **old.along(
             lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend),
             passed,
         ),
-        constraints=(*(item for item in asked if item is not None), *wanted),
+        constraints=(*asked, *wanted),
     )
     # Of the tool's motion at any pace the same joint path is of minimum norm.
     is_whole = plan.initial_trajectory.duration == plan.trajectory.duration

@@ -24,7 +24,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Relaxation, Task
 from selfmotion.planning.result.move import Move
 from selfmotion.planning.result.plan import Plan
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.constraints import Clearance, Constraint, clearances_among
 from selfmotion.problem.problem import Problem, arm_rest_orders, rest_orders
 
 # Paths with other descriptions are the same if they are nearer than _SAME at their marks, and at
@@ -162,7 +162,8 @@ def not_judged_by(
     for item in required:
         if described(item) not in known:
             yield f"it is not judged by {type(item).__name__}, which was asked for"
-    if clearance is not None and not any(keeps_as_far(item, clearance) for item in judged):
+    apart = clearances_among(judged)
+    if clearance is not None and not any(item.keeps_as_far(clearance) for item in apart):
         yield "it is not judged by the clearance that was asked for"
 
 
@@ -237,15 +238,6 @@ def _same_bands(judged_by: Sequence[Relaxation], required: Sequence[Relaxation])
         if window is not None and not np.allclose(during, window, rtol=0.0, atol=_ROUNDING):
             return False
     return True
-
-
-def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
-    """Whether a constraint keeps all that a clearance does of the arm itself and its own bodies."""
-    return (
-        isinstance(item, Clearance)
-        and item.distance >= apart.distance
-        and set(item.disabled) <= set(apart.disabled)
-    )
 
 
 # Largest gap between the end of one motion and the start of the next, from rounding [rad or m].

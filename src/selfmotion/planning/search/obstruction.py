@@ -12,7 +12,15 @@ from selfmotion.model.follow import RelaxedFrames
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search.single_poses import CLIMBERS, MOST_EVALUATED, Found, SinglePoses
+from selfmotion.planning.search.single_poses import (
+    CLIMBERS,
+    MOST_EVALUATED,
+    Found,
+    SinglePoses,
+    first_blocked,
+    room_of,
+    search_closely,
+)
 from selfmotion.planning.search.starts import start_candidates
 from selfmotion.planning.search.vertices import AT_LIMIT
 
@@ -76,7 +84,7 @@ def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
     shift = np.zeros(3)
     for _ in range(_MOVE_TRIES):
         moved = poses.shifted(shift)
-        blocked = moved.first_blocked(times)
+        blocked = first_blocked(moved, times)
         if blocked is None:
             return shift
         more = least_deviation(moved, blocked, POSITION_ROWS)
@@ -245,7 +253,7 @@ def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
     """Return the nearest bodies at the smallest overlap of all, and the required distance."""
     # The last ones were moved away from obstacles.
     _, worst, required = max(
-        (poses.room(q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0]
+        (room_of(poses, q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0]
     )
     return worst, required
 
@@ -272,7 +280,7 @@ def obstruction(
             t, np.empty((0, poses.coordinates.dof)) if near is None else known[near]
         )
         if not len(found.free):
-            found = poses.search_closely(t, found)
+            found = search_closely(poses, t, found)
         if not len(found.free):
             again = np.array([t, *(other for other in order if other != t)])
             return Obstruction(t, len(found.met) > 0, poses, found, again)
@@ -350,7 +358,7 @@ def reachable(
             # From right before it, a pose that only seemed out of reach is found.
             found = poses.solve(t, known)
         if not len(found.free):
-            found = poses.search_closely(t, found)
+            found = search_closely(poses, t, found)
         if not len(found.free):
             return Reach(last, first, _out_of_reach(poses, last, known[0], times[times > last]))
         known, last = found.free, float(t)

@@ -134,19 +134,6 @@ class SinglePoses:
         """
         return self._manifold.project(q, self.target(t), far=far, held=self._held(t))
 
-    def first_blocked(self, times: Array) -> float | None:
-        """Return the first of some times [s] at whose poses a quick search finds nothing."""
-        known = np.empty((0, self.coordinates.dof))
-        for t in times.tolist():
-            found = self.solve(t, known)
-            if not len(found.free):
-                q = self._by_damped_steps(t, _APPROACHED)
-                found = replace(found, free=q[self.bounds.keep(q)])
-            if not len(found.free):
-                return float(t)
-            known = found.free
-        return None
-
     def solve(self, t: float, known: Array) -> Found:
         """Return the solutions at t [s] from configurations nearby (K, n), and from anywhere."""
         near = self._reached(t, known[:_BRANCHES])
@@ -156,28 +143,6 @@ class SinglePoses:
         far = self._reached(t, self._seeds, far=True)
         free = far[self.bounds.keep(far)]
         return Found(free, np.concatenate([near, far]), len(known[:_BRANCHES]) + len(self._seeds))
-
-    def search_closely(self, t: float, before: Found) -> Found:
-        """Return the solutions by all methods, after a search without a free one."""
-        seeds = spread(self.coordinates, _MORE_SEEDS, self._rng)
-        far = self._reached(t, seeds, far=True)
-        tries = before.tries + len(seeds)
-        free = far[self.bounds.keep(far)]
-        met = np.concatenate([before.met, far])
-        if len(free):
-            return Found(free, met, tries)
-        slowly = self._by_damped_steps(t, _MORE_APPROACHED)
-        tries += _MORE_APPROACHED
-        free, met = slowly[self.bounds.keep(slowly)], np.concatenate([met, slowly])
-        if len(free) or not len(met):
-            return Found(free, met, tries)
-        for more in (self._along_curves, self._wandered, self._climbed):
-            q = more(t, met)
-            free, met = q[self.bounds.keep(q)], np.concatenate([met, q])
-            tries += len(q)
-            if len(free):
-                break
-        return Found(free, met, tries)
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
         """Return the solutions of Newton's method from seeds (K, n) for the pose at t, (K', n)."""
@@ -206,60 +171,100 @@ class SinglePoses:
         noise = self._rng.normal(size=near.shape) * np.tile(_CLOSE, count)[: len(near), None]
         return np.concatenate([near + noise / self.coordinates.weights, self._seeds])
 
-    def _along_curves(self, t: float, met: Array) -> Array:
-        """Return samples of all self-motions of a pose, where these are curves, (K, n).
 
-        Those within the limits: the curves go on beyond them.
-        """
-        if self.follows.redundancy != 1 or self._held(t).any():
-            return np.empty((0, self.coordinates.dof))
-        motion = SelfMotion(self.follows, SPACING)
-        target = self.target(t)
-        seeds = spread(self.coordinates, TRACING_SEEDS, self._rng)
-        samples = [curve.q for curve in motion.curves(target, seeds).curves]
-        every = np.concatenate([np.empty((0, self.coordinates.dof)), *samples])
-        q = self.bounds.representative(every)
-        most = self.follows.within_bands(q)
-        lower, upper = np.maximum(self.bounds.lower, -most), np.minimum(self.bounds.upper, most)
-        return np.asarray(q[((q >= lower) & (q <= upper)).all(axis=1)])
+def first_blocked(poses: SinglePoses, times: Array) -> float | None:
+    """Return the first of some times [s] at whose poses a quick search finds nothing."""
+    known = np.empty((0, poses.coordinates.dof))
+    for t in times.tolist():
+        found = poses.solve(t, known)
+        if not len(found.free):
+            q = poses._by_damped_steps(t, _APPROACHED)
+            found = replace(found, free=q[poses.bounds.keep(q)])
+        if not len(found.free):
+            return float(t)
+        known = found.free
+    return None
 
-    def _wandered(self, t: float, met: Array) -> Array:
-        """Return configurations that random walks along the self-motions lead to, (K, n).
 
-        From anywhere Newton's method may lead to few of them only, where limits are near.
-        """
-        known = met
-        for _ in range(_WALKS):
-            here = known[self._rng.integers(len(known), size=_WALKERS)]
-            size = self._rng.choice(_WALK_STEPS, size=(_WALKERS, 1))
-            away = self._rng.normal(size=here.shape) * size / self.coordinates.weights
-            found, arrived = self.project(here + away, t)
-            known = np.concatenate([known, found[arrived]])
-            if self.bounds.keep(found[arrived]).any():
-                break
-        return np.asarray(known[len(met) :])
+def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
+    """Return the solutions by all methods, after a search without a free one."""
+    seeds = spread(poses.coordinates, _MORE_SEEDS, poses._rng)
+    far = poses._reached(t, seeds, far=True)
+    tries = before.tries + len(seeds)
+    free = far[poses.bounds.keep(far)]
+    met = np.concatenate([before.met, far])
+    if len(free):
+        return Found(free, met, tries)
+    slowly = poses._by_damped_steps(t, _MORE_APPROACHED)
+    tries += _MORE_APPROACHED
+    free, met = slowly[poses.bounds.keep(slowly)], np.concatenate([met, slowly])
+    if len(free) or not len(met):
+        return Found(free, met, tries)
+    for more in (_along_curves, _wandered, _climbed):
+        q = more(poses, t, met)
+        free, met = q[poses.bounds.keep(q)], np.concatenate([met, q])
+        tries += len(q)
+        if len(free):
+            break
+    return Found(free, met, tries)
 
-    def _climbed(self, t: float, met: Array) -> Array:
-        """Return configurations that are less near to bodies than those that were found, (K, n)."""
-        some = met[:: -(-len(met) // MOST_EVALUATED)]
-        best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
-        room = np.array([self.room(q)[0] for q in best])
-        for size in _CLIMBS:
-            away = self._rng.normal(scale=size, size=best.shape) / self.coordinates.weights
-            found, arrived = self.project(best + away, t)
-            for k in np.flatnonzero(arrived):
-                here = self.room(found[k])[0]
-                if here > room[k]:
-                    best[k], room[k] = found[k], here
-            if room.max() > 0.0:
-                break
-        return best
 
-    def room(self, q: Array) -> tuple[float, Closest, float]:
-        """Return the excess clearance at q (n,) [m], the worst pair, and the required distance."""
-        each = [
-            (model.distance(q[: model.robot.dof]), required)
-            for model, required in self.bounds.bodies
-        ]
-        rooms = ((closest.value - required, closest, required) for closest, required in each)
-        return min(rooms, key=lambda found: found[0])
+def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
+    """Return samples of all poses-motions of a pose, where these are curves, (K, n).
+
+    Those within the limits: the curves go on beyond them.
+    """
+    if poses.follows.redundancy != 1 or poses._held(t).any():
+        return np.empty((0, poses.coordinates.dof))
+    motion = SelfMotion(poses.follows, SPACING)
+    target = poses.target(t)
+    seeds = spread(poses.coordinates, TRACING_SEEDS, poses._rng)
+    samples = [curve.q for curve in motion.curves(target, seeds).curves]
+    every = np.concatenate([np.empty((0, poses.coordinates.dof)), *samples])
+    q = poses.bounds.representative(every)
+    most = poses.follows.within_bands(q)
+    lower, upper = np.maximum(poses.bounds.lower, -most), np.minimum(poses.bounds.upper, most)
+    return np.asarray(q[((q >= lower) & (q <= upper)).all(axis=1)])
+
+
+def _wandered(poses: SinglePoses, t: float, met: Array) -> Array:
+    """Return configurations that random walks along the poses-motions lead to, (K, n).
+
+    From anywhere Newton's method may lead to few of them only, where limits are near.
+    """
+    known = met
+    for _ in range(_WALKS):
+        here = known[poses._rng.integers(len(known), size=_WALKERS)]
+        size = poses._rng.choice(_WALK_STEPS, size=(_WALKERS, 1))
+        away = poses._rng.normal(size=here.shape) * size / poses.coordinates.weights
+        found, arrived = poses.project(here + away, t)
+        known = np.concatenate([known, found[arrived]])
+        if poses.bounds.keep(found[arrived]).any():
+            break
+    return np.asarray(known[len(met) :])
+
+
+def _climbed(poses: SinglePoses, t: float, met: Array) -> Array:
+    """Return configurations that are less near to bodies than those that were found, (K, n)."""
+    some = met[:: -(-len(met) // MOST_EVALUATED)]
+    best = some[np.argsort([-room_of(poses, q)[0] for q in some])[:CLIMBERS]]
+    room = np.array([room_of(poses, q)[0] for q in best])
+    for size in _CLIMBS:
+        away = poses._rng.normal(scale=size, size=best.shape) / poses.coordinates.weights
+        found, arrived = poses.project(best + away, t)
+        for k in np.flatnonzero(arrived):
+            here = room_of(poses, found[k])[0]
+            if here > room[k]:
+                best[k], room[k] = found[k], here
+        if room.max() > 0.0:
+            break
+    return best
+
+
+def room_of(poses: SinglePoses, q: Array) -> tuple[float, Closest, float]:
+    """Return the excess clearance at q (n,) [m], the worst pair, and the required distance."""
+    each = [
+        (model.distance(q[: model.robot.dof]), required) for model, required in poses.bounds.bodies
+    ]
+    rooms = ((closest.value - required, closest, required) for closest, required in each)
+    return min(rooms, key=lambda found: found[0])

@@ -160,12 +160,12 @@ class FreeMotions:
         A polyline from the first to the last one may be `known`; see `between`.
         """
         self._progress("move", 1, 1)
-        blocked = self._blocked(ends)
+        blocked = _blocked(self, ends)
         if blocked:
-            return self._missing(blocked)
+            return _missing(self, blocked)
         # Processor time: the result is independent of other processes.
         began = time.thread_time()
-        ends = [self._inside(several) for several in ends]
+        ends = [_inside(self, several) for several in ends]
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(_TRIES_OF_MOVE):
             room = Room(self.envelope, self.robot, margin, finer)
@@ -179,61 +179,19 @@ class FreeMotions:
                 try:
                     move = self.at_its_pace(path)
                 except PlanError as error:
-                    return self._missing(str(error))
+                    return _missing(self, str(error))
                 if move.verified:
                     return move
                 worst = worst or f", where {move.trouble}"
             margin, finer = _WIDER * margin, _WIDER * finer
         waited = time.thread_time() - began
-        return self._missing(
-            f"no way was found between the configurations in {waited:.1f} s{worst}"
+        return _missing(
+            self, f"no way was found between the configurations in {waited:.1f} s{worst}"
         )
-
-    def _inside(self, q: Array) -> Array:
-        """Return configurations on a limit as far inside it as rounding may lead beyond."""
-        lower, upper = self.envelope.lower, self.envelope.upper
-        return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
-
-    def _missing(self, trouble: str) -> Move:
-        return Move(self.robot, self.constraints, None, trouble)
-
-    def _blocked(self, ends: Sequence[Array]) -> str:
-        """Return the cause why an end is not allowed, "" for none."""
-        room = Room(self.envelope, self.robot, 0.0)
-        for number, several in enumerate(ends):
-            if room.free(several).any():
-                continue
-            where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
-            return f"the {where} configuration is not allowed: {self._wrong_with(several[0])}"
-        return ""
 
     def refusal(self, q: Array) -> str:
         """Return the cause why no motion starts or ends at a configuration (n,), "" for none."""
-        return "" if Room(self.envelope, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
-
-    def _wrong_with(self, q: Array) -> str:
-        """Return the violated condition of a configuration (n,), in words."""
-        envelope, beyond = self.envelope, []
-        for joint, name in enumerate(self.robot.joint_names):
-            low, high = envelope.lower[joint], envelope.upper[joint]
-            if max(low - q[joint], q[joint] - high) > ROUNDING:
-                beyond.append(
-                    f"joint '{name}' is at {q[joint]:.5g} {self.robot.unit_of(name)} "
-                    f"({low:.5g} to {high:.5g} allowed)"
-                )
-        if beyond:
-            turns = [k for k, name in enumerate(self.robot.joint_names)
-                     if not self.robot.is_prismatic(name)]  # fmt: skip
-            in_degrees = bool(turns) and np.abs(q[turns]).max() > TURN
-            asked_for = "; are these degrees? Angles are in rad" if in_degrees else ""
-            return f"{'; '.join(beyond)}; give one within the limits{asked_for}"
-        for model, far in envelope.bodies:
-            near = model.distance(q)
-            if near.value < far:
-                apart = f"{how_near(near.value)} (wanted: {far * 1e3:.2f} mm)"
-                return f"{near.first} and {near.second} {apart}"
-        names = ", ".join(item.name for item in envelope.quantities)
-        return f"it leaves what is asked of {names}"
+        return "" if Room(self.envelope, self.robot, 0.0).free(q[None])[0] else _wrong_with(self, q)
 
     def _known_polyline(
         self, room: Room, ends: Sequence[Array], known: Array | None
@@ -254,52 +212,13 @@ class FreeMotions:
         legs: list[Array] = []
         starts = _allowed(room, ends[0])
         for goals in ends[1:]:
-            leg = self._leg(room, starts, _allowed(room, goals), end)
+            leg = _leg(self, room, starts, _allowed(room, goals), end)
             if leg is None:
                 return None
             legs.append(leg)
             starts = leg[-1:]
         passed = np.cumsum([len(leg) - 1 for leg in legs]).tolist()[:-1]
         return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
-
-    def _leg(self, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
-        """Return a polyline from one of starts (a, n) to one of goals (b, n), also after a retreat.
-
-        In a workpiece the only way out is narrow, and along the tool's axis.
-        """
-        direct = straight_legs(room, starts, goals)
-        if direct is not None:
-            return direct
-        out = [self._retreats(room, several) for several in (starts, goals)]
-        first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
-        polyline = find_path(room, first, last, end, self._rng)
-        if polyline is None:
-            return None
-        before, after = (
-            [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
-            for each, tip in zip(out, (polyline[0], polyline[-1]), strict=True)
-        )
-        if not (before or after):
-            return polyline
-        whole = np.concatenate(
-            [*(q[None] for q in before[:1]), polyline, *(q[None] for q in after[:1])]
-        )
-        return shortened(room, whole, self._rng)
-
-    def _retreats(self, room: Room, several: Array) -> tuple[Array, Array]:
-        """Return configurations of retreats, and those from which a free leg leads there."""
-        robot, found, origins = self.robot, list[Array](), list[Array]()
-        for q in several:
-            for length in _RETREATS:
-                away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
-                try:
-                    there = robot.inverse_kinematics(away, seed=q, attempts=1)
-                except InverseKinematicsError:
-                    continue
-                if room.is_open(q, there):
-                    found.append(there)
-                    origins.append(q)
-        return np.reshape(found, (-1, robot.dof)), np.reshape(origins, (-1, robot.dof))
 
     @property
     def _limits(self) -> Envelope:
@@ -361,6 +280,93 @@ class FreeMotions:
         longest = max(needed, _SOFT)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def _inside(motions: FreeMotions, q: Array) -> Array:
+    """Return configurations on a limit as far inside it as rounding may lead beyond."""
+    lower, upper = motions.envelope.lower, motions.envelope.upper
+    return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
+
+
+def _missing(motions: FreeMotions, trouble: str) -> Move:
+    return Move(motions.robot, motions.constraints, None, trouble)
+
+
+def _blocked(motions: FreeMotions, ends: Sequence[Array]) -> str:
+    """Return the cause why an end is not allowed, "" for none."""
+    room = Room(motions.envelope, motions.robot, 0.0)
+    for number, several in enumerate(ends):
+        if room.free(several).any():
+            continue
+        where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
+        return f"the {where} configuration is not allowed: {_wrong_with(motions, several[0])}"
+    return ""
+
+
+def _wrong_with(motions: FreeMotions, q: Array) -> str:
+    """Return the violated condition of a configuration (n,), in words."""
+    envelope, beyond = motions.envelope, []
+    for joint, name in enumerate(motions.robot.joint_names):
+        low, high = envelope.lower[joint], envelope.upper[joint]
+        if max(low - q[joint], q[joint] - high) > ROUNDING:
+            beyond.append(
+                f"joint '{name}' is at {q[joint]:.5g} {motions.robot.unit_of(name)} "
+                f"({low:.5g} to {high:.5g} allowed)"
+            )
+    if beyond:
+        turns = [k for k, name in enumerate(motions.robot.joint_names)
+                 if not motions.robot.is_prismatic(name)]  # fmt: skip
+        in_degrees = bool(turns) and np.abs(q[turns]).max() > TURN
+        asked_for = "; are these degrees? Angles are in rad" if in_degrees else ""
+        return f"{'; '.join(beyond)}; give one within the limits{asked_for}"
+    for model, far in envelope.bodies:
+        near = model.distance(q)
+        if near.value < far:
+            apart = f"{how_near(near.value)} (wanted: {far * 1e3:.2f} mm)"
+            return f"{near.first} and {near.second} {apart}"
+    names = ", ".join(item.name for item in envelope.quantities)
+    return f"it leaves what is asked of {names}"
+
+
+def _leg(motions: FreeMotions, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
+    """Return a polyline from one of starts (a, n) to one of goals (b, n), also after a retreat.
+
+    In a workpiece the only way out is narrow, and along the tool's axis.
+    """
+    direct = straight_legs(room, starts, goals)
+    if direct is not None:
+        return direct
+    out = [_retreats(motions, room, several) for several in (starts, goals)]
+    first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
+    polyline = find_path(room, first, last, end, motions._rng)
+    if polyline is None:
+        return None
+    before, after = (
+        [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
+        for each, tip in zip(out, (polyline[0], polyline[-1]), strict=True)
+    )
+    if not (before or after):
+        return polyline
+    whole = np.concatenate(
+        [*(q[None] for q in before[:1]), polyline, *(q[None] for q in after[:1])]
+    )
+    return shortened(room, whole, motions._rng)
+
+
+def _retreats(motions: FreeMotions, room: Room, several: Array) -> tuple[Array, Array]:
+    """Return configurations of retreats, and those from which a free leg leads there."""
+    robot, found, origins = motions.robot, list[Array](), list[Array]()
+    for q in several:
+        for length in _RETREATS:
+            away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+            try:
+                there = robot.inverse_kinematics(away, seed=q, attempts=1)
+            except InverseKinematicsError:
+                continue
+            if room.is_open(q, there):
+                found.append(there)
+                origins.append(q)
+    return np.reshape(found, (-1, robot.dof)), np.reshape(origins, (-1, robot.dof))
 
 
 def is_pose(end: npt.ArrayLike | SE3) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from warnings import warn
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
+    FormerUseWarning,
     ProblemError,
     Progress,
     as_number,
@@ -23,8 +25,14 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Task
 from selfmotion.planning.result import Move
 from selfmotion.planning.transfer.free_motion import MOVE_SECONDS, FreeMotions, is_pose
-from selfmotion.problem.constraints import Clearance, Constraint
-from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times
+from selfmotion.problem.constraints import (
+    MOVED_CLEARANCE,
+    NO_OVERLAP,
+    Clearance,
+    Constraint,
+    said_once,
+)
+from selfmotion.problem.problem import KEPT, check_all_times
 
 
 def move(
@@ -33,7 +41,7 @@ def move(
     last: npt.ArrayLike | SE3,
     *,
     constraints: Sequence[Constraint] = KEPT,
-    clearance: Clearance | None = NO_OVERLAP,
+    clearance: Clearance | Sequence[Clearance] | None = NO_OVERLAP,
     via: Sequence[npt.ArrayLike] = (),
     task: Task | str = "pose",
     seconds: float = MOVE_SECONDS,
@@ -55,10 +63,9 @@ def move(
     constraints : sequence of Constraint
         Conditions on the motion. By default limits of joint position and velocity, and those of
         acceleration and jerk that the arm's maker publishes.
-    clearance : Clearance, optional
+    clearance : Clearance or sequence of Clearance, optional
         Distance of the arm from obstacles and from itself: by default its links must not overlap.
-        None to leave that out; the verdict then says so. A `Clearance` among the constraints takes
-        the place of the default.
+        None to leave that out; the verdict then says so.
     via : sequence of (n,)
         Configurations that the motion passes exactly, in this order, without stopping where there
         is room for a curve.
@@ -87,14 +94,12 @@ def move(
     """
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
-    conditions = list(as_several(constraints, "constraints", Constraint))
-    check_all_times(conditions, "the ends of a move are first and last; leave it out")
-    if clearance is not None and not isinstance(clearance, Clearance):
-        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
-    apart = any(item.envelope(robot).bodies for item in conditions)
-    default = clearance is NO_OVERLAP and (apart or not robot.urdf.has_collisions)
-    if clearance is not None and not default:
-        conditions.append(clearance)
+    listed = as_several(constraints, "constraints", Constraint)
+    check_all_times(listed, "the ends of a move are first and last; leave it out")
+    others, apart = said_once(listed, clearance)
+    if len(others) < len(listed):
+        warn(MOVED_CLEARANCE.format("move"), FormerUseWarning, stacklevel=2)
+    conditions = [item for item in (*others, *apart) if item.applies(robot)]
     if not isinstance(via, list | tuple | np.ndarray):
         raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
     given = (first, *via, last)

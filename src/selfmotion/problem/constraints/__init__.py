@@ -18,8 +18,13 @@ from selfmotion.problem.constraints.bound_ends import (
 )
 from selfmotion.problem.constraints.bound_limits import BoundLimits as BoundLimits
 from selfmotion.problem.constraints.clearance import (
+    MOVED_CLEARANCE as MOVED_CLEARANCE,
+    NO_OVERLAP as NO_OVERLAP,
     BoundClearance as BoundClearance,
     Clearance as Clearance,
+    as_clearances as as_clearances,
+    clearances_among as clearances_among,
+    said_once as said_once,
 )
 from selfmotion.problem.constraints.conditions import (
     BoundConstraint as BoundConstraint,

@@ -40,6 +40,8 @@ class Envelope:
         Of q alone, with limits.
     curves : tuple of BrakingCurves
         Limits of q̇ that depend on q.
+    tool_speed : float
+        Limit of the tool's speed [m/s]; inf for none.
     """
 
     lower: Array
@@ -50,6 +52,7 @@ class Envelope:
     bodies: tuple[tuple[CollisionModel, float], ...] = ()
     quantities: tuple[Quantity, ...] = ()
     curves: tuple[BrakingCurves, ...] = ()
+    tool_speed: float = np.inf
 
     @classmethod
     def unbounded(cls, dof: int) -> Envelope:
@@ -92,6 +95,7 @@ class Envelope:
             (*self.bodies, *other.bodies),
             (*self.quantities, *other.quantities),
             (*self.curves, *other.curves),
+            min(self.tool_speed, other.tool_speed),
         )
 
     def admits(self, q: Array) -> npt.NDArray[np.bool_]:
@@ -141,6 +145,10 @@ class Ends(NamedTuple):
     velocity: tuple[bool, bool] = (False, False)
     acceleration: tuple[bool, bool] = (False, False)
 
+    def is_about(self, end: int) -> bool:
+        """Return whether it says anything of the start (0) or of the end (1)."""
+        return self.closes or self.pins[end] or self.velocity[end] or self.acceleration[end]
+
 
 class Constraint(Saved, ABC, family="constraint"):
     """Something that a motion must keep, not yet bound to an arm.
@@ -158,6 +166,8 @@ class Constraint(Saved, ABC, family="constraint"):
         Whether it limits the pace of a motion rather than its path in joint space.
     kept_moving : bool
         Whether its envelope is the whole constraint, so that it can be kept while the arm moves.
+    key, option : str
+        What in a problem file, and which option besides, gives limits that are not known of an arm.
     ends : Ends
         What it says of the first and the last state.
     """
@@ -165,6 +175,8 @@ class Constraint(Saved, ABC, family="constraint"):
     margin: float = 1e-3
     of_pace: ClassVar[bool] = False
     kept_moving: ClassVar[bool] = False
+    key: ClassVar[str] = "limit"
+    option: ClassVar[str] = ""
     ends: ClassVar[Ends] = Ends()
 
     def quantity(self, robot: RobotModel) -> Quantity:
@@ -204,13 +216,21 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return the remainder for a motion that rests at both ends by itself."""
         return self
 
-    def on_part(self) -> Constraint | None:
-        """Return the constraint for a first part of the path; None for none."""
+    def for_controller(self, *, lines: bool = False) -> Constraint | None:
+        """Return the remainder for a motion that a controller makes between targets; None for none.
+
+        It chooses accelerations of joints itself; on straight `lines` corners have none at all.
+        """
         return self
 
-    def on_last_part(self) -> Constraint | None:
-        """Return the constraint for a last part of the path; None for none."""
-        return self
+    def remarks(self, robot: RobotModel) -> tuple[str, ...]:
+        """Return notes before planning, as on limits that no arm has."""
+        return ()
+
+    @property
+    def load(self) -> tuple[float, Array] | None:
+        """Mass [kg] that the tool holds and its centre (3,) [m] in the tool's frame, if it says."""
+        return None
 
 
 def check_changes(quantity: Quantity, robot: RobotModel) -> None:

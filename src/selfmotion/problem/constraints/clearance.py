@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -98,6 +98,20 @@ class Clearance(Constraint):
             )
         object.__setattr__(self, "distance", distance)
 
+    @property
+    def is_no_overlap(self) -> bool:
+        """Whether it asks no more than that links do not overlap, which they rarely do."""
+        return not self.obstacles and self.distance == 0.0
+
+    def keeps_as_far(self, other: Clearance) -> bool:
+        """Return whether it keeps all that another does of the arm itself and its own bodies."""
+        return self.distance >= other.distance and set(self.disabled) <= set(other.disabled)
+
+    @override
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`: the default one not to an arm without bodies."""
+        return self is not NO_OVERLAP or robot.urdf.has_collisions
+
     def model(self, robot: RobotModel) -> CollisionModel:
         """Return the exact model that the certificate uses, cached by arm.
 
@@ -144,6 +158,56 @@ class Clearance(Constraint):
         if robot not in by_robot:
             by_robot[robot] = _Models(self, robot)
         return by_robot[robot]
+
+
+# Default: links must not overlap; one object, so that its bodies are built once by arm.
+NO_OVERLAP = Clearance(distance=0.0)
+
+
+# Warning where a clearance is among the constraints of what is called {}.
+MOVED_CLEARANCE = (
+    "a Clearance is among the constraints, where the next version will not take it: write "
+    "{}(…, clearance=Clearance(…)), or clearance=[Clearance(…), …] of several"
+)
+
+
+def as_clearances(given: Any) -> tuple[Clearance, ...]:
+    """Return what is given as a clearance: one or several, None for none.
+
+    Raises
+    ------
+    ProblemError
+        It is something else.
+    """
+    listed = (given,) if isinstance(given, Clearance) else () if given is None else given
+    if isinstance(listed, list | tuple) and all(isinstance(item, Clearance) for item in listed):
+        return tuple(listed)
+    raise ProblemError(
+        f"clearance is {shown(given)}, expected a Clearance, a list of several, or None"
+    )
+
+
+def clearances_among(constraints: Sequence[Constraint]) -> tuple[Clearance, ...]:
+    """Return the clearances among constraints, in their order."""
+    return tuple(item for item in constraints if isinstance(item, Clearance))
+
+
+def without_clearances(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return the other constraints, in their order."""
+    return tuple(item for item in constraints if not isinstance(item, Clearance))
+
+
+def said_once(
+    constraints: Sequence[Constraint], clearance: Any
+) -> tuple[tuple[Constraint, ...], tuple[Clearance, ...]]:
+    """Return constraints without clearances, and all clearances.
+
+    Those among the constraints come first, and take the place of the default.
+    """
+    moved, given = clearances_among(constraints), as_clearances(clearance)
+    if moved and clearance is NO_OVERLAP:
+        given = ()
+    return without_clearances(constraints), (*moved, *given)
 
 
 def _pair(given: Any) -> tuple[str, str]:

@@ -49,9 +49,6 @@ class EndConfiguration(Constraint):
     def requirement(self, robot: RobotModel) -> EndState:
         return EndState(0, read_only(robot.configuration(self.q)))
 
-    def on_part(self) -> None:
-        """See `Constraint.on_part`: the part ends elsewhere."""
-
 
 class _EndRate(Constraint):
     """A velocity or an acceleration at one end: the one field of each class."""
@@ -90,14 +87,6 @@ class _EndRate(Constraint):
         """Return the prescribed value for an arm, (n,) [rad or m, per s^order]."""
         what = f"{robot.name}: {self._name}"
         return as_numbers(per_joint(self.given, robot.dof, what), what)
-
-    def on_part(self) -> Constraint | None:
-        """See `Constraint.on_part`: a first part has the same start, but another end."""
-        return self if self.at_start else None
-
-    def on_last_part(self) -> Constraint | None:
-        """See `Constraint.on_last_part`: a last part has the same end, but another start."""
-        return None if self.at_start else self
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,9 +221,3 @@ class ClosedPath(Constraint):
     def at_rest(self) -> ClosedPath:
         """See `Constraint.at_rest`: both velocities are 0."""
         return ClosedPath(velocity=False)
-
-    def on_part(self) -> None:
-        """See `Constraint.on_part`: a part of a loop is not closed."""
-
-    def on_last_part(self) -> None:
-        """See `Constraint.on_last_part`: a part of a loop is not closed."""

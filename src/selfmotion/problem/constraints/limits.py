@@ -17,6 +17,10 @@ from selfmotion.problem.constraints.bound import Conditions
 from selfmotion.problem.constraints.bound_limits import BoundLimits
 
 _RATES = ("position", "velocity", "acceleration", "jerk")
+# Limits this many times the arm's own are in other units.
+_FAR_ABOVE = 10.0
+# The same of limits that no joint has, by order of derivative: unit and value.
+_MOST = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +136,30 @@ class _RateLimits(Constraint):
     def envelope(self, robot: RobotModel) -> Envelope:
         return Envelope.of_limits(self.requirement(robot))
 
+    @override
+    def for_controller(self, *, lines: bool = False) -> Constraint | None:
+        return self if self.order == 1 else None
+
+    @override
+    def remarks(self, robot: RobotModel) -> tuple[str, ...]:
+        """See `Constraint.remarks`: limits far above the arm's own, or any arm's, by joint."""
+        if self.limit is None:
+            return ()
+        (unit, most), published = _MOST[self.order], self.published(robot)
+        given = per_joint(self.limit, robot.dof, f"{robot.name}: {LIMIT_NAMES[self.order]}")
+        for k, name in enumerate(robot.joint_names):
+            if robot.is_prismatic(name) or not np.isfinite(given[k]):
+                continue
+            said = ""
+            if not self.replace and given[k] > _FAR_ABOVE * published[k]:
+                said = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
+            elif given[k] > most:
+                said = f"is more than arms do (above {most:g} {unit})"
+            if said:
+                kind = type(self).__name__
+                return (f"{kind}: {given[k]:g} {unit} for '{name}' {said}; in degrees? limit_deg",)
+        return ()
+
 
 @dataclass(frozen=True, eq=False)
 class JointVelocityLimits(_RateLimits):
@@ -171,6 +199,7 @@ class JointAccelerationLimits(_RateLimits):
 
     order: ClassVar[int] = 2
     kept_moving: ClassVar[bool] = True
+    option: ClassVar[str] = "--acceleration"
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-4
@@ -267,6 +296,16 @@ class JointTorqueLimits(Constraint):
         shared = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
         each = self.limit is None and bool((shared > 0.0).any())
         return each or bool(np.isfinite(self.of(robot)).any())
+
+    @override
+    def for_controller(self, *, lines: bool = False) -> Constraint | None:
+        # Torques are judged along the smooth curve.
+        return None if lines else self
+
+    @property
+    @override
+    def load(self) -> tuple[float, Array]:
+        return float(self.payload), np.asarray(self.center, dtype=np.float64).reshape(3)
 
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [Nm or N]."""

@@ -58,6 +58,7 @@ class PositionDependentVelocityLimits(Constraint):
 
     of_pace: ClassVar[bool] = True
     kept_moving: ClassVar[bool] = True
+    key: ClassVar[str] = "deceleration"
 
     deceleration: npt.ArrayLike | None = None
     offset: npt.ArrayLike | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ from selfmotion.certificate import Column, MotionSegments, Quantity
 from selfmotion.model.robot import RobotModel, ToolRates
 from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
 
+# Limit of the tool's speed that no arm has [m/s].
+_FASTEST_TOOL = 50.0
 # Limited rates of the tool, as in [v, ω] and [dv/dt, dω/dt], and their units.
 TOOL_RATES = (
     ("speed", "m/s"),
@@ -60,6 +62,22 @@ class ToolLimits(Constraint):
                 "tool limits: none is given, expected one of speed, turn_rate, acceleration and "
                 "turn_acceleration"
             )
+
+    @override
+    def envelope(self, robot: RobotModel) -> Envelope:
+        return replace(Envelope.unbounded(robot.dof), tool_speed=self.speed)
+
+    @override
+    def for_controller(self, *, lines: bool = False) -> Constraint | None:
+        if not lines:
+            return self
+        return replace(self, acceleration=np.inf, turn_acceleration=np.inf)
+
+    @override
+    def remarks(self, robot: RobotModel) -> tuple[str, ...]:
+        if not _FASTEST_TOOL < self.speed < np.inf:
+            return ()
+        return (f"ToolLimits: a speed of {self.speed:g} m/s is no limit; in mm/s? speed_mm",)
 
     @property
     def _given(self) -> tuple[float, float, float, float]:

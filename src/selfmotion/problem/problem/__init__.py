@@ -6,6 +6,7 @@ from selfmotion.problem.problem.along import (
     check_all_times as check_all_times,
     constraints_of_part as constraints_of_part,
     envelope_of as envelope_of,
+    envelope_without_arm as envelope_without_arm,
     given_end as given_end,
     length_of as length_of,
     rest_orders as rest_orders,
@@ -19,7 +20,7 @@ from selfmotion.problem.problem.calibrated import (
 )
 from selfmotion.problem.problem.fit import (
     KEPT as KEPT,
-    NO_OVERLAP as NO_OVERLAP,
+    OF_MAKER as OF_MAKER,
     START_TOLERANCE as START_TOLERANCE,
     check_feeds as check_feeds,
 )

@@ -146,26 +146,20 @@ _SHORTEST_WINDOW = 1e-2
 def constraints_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
     """Yield the constraints for a part that is the first or the last one, or neither."""
     for item in problem.constraints:
-        selected: Constraint | None = None if item.ends.closes else item
-        if selected is not None and not is_last:
-            selected = selected.on_part()
-        if selected is not None and not is_first:
-            selected = selected.on_last_part()
-        if selected is not None:
-            yield selected
+        elsewhere = (item.ends.is_about(0) and not is_first, item.ends.is_about(1) and not is_last)
+        if not (item.ends.closes or any(elsewhere)):
+            yield item
 
 
 def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
     """Return the conditions of constraints at all times, without those at an end."""
-    parts = (item.on_part() for item in constraints)
-    inner = (part.on_last_part() for part in parts if part is not None)
-    return [item for item in inner if item is not None]
+    return [item for item in constraints if not (item.ends.is_about(0) or item.ends.is_about(1))]
 
 
 def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
     """Raise ProblemError, with a remedy, where a constraint is on an end alone."""
     for item in constraints:
-        if item.on_part() is None or item.on_last_part() is None:
+        if item.ends.is_about(0) or item.ends.is_about(1):
             raise ProblemError(
                 f"constraints: {type(item).__name__} asks something of an end alone: {remedy}"
             )

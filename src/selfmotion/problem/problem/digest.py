@@ -1,20 +1,23 @@
 """Identifier of what a certificate judges: a kept one is not taken for another problem's."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from selfmotion.basics import description_of, digest_of, digest_of_file
 from selfmotion.model.robot import mesh_digests
+from selfmotion.problem.constraints import Constraint
 
 if TYPE_CHECKING:
     from selfmotion.problem.problem.problem import Problem
 
 
-def conditions_digest(problem: "Problem") -> str:
+def conditions_digest(problem: "Problem", former: Sequence[Constraint] | None = None) -> str:
     """Return an identifier of what the certificate of a problem judges.
 
     A digest of the arm, task frames, tolerances, start and constraints; costs and the null
-    motion are left out, since no certificate judges them.
+    motion are left out, since no certificate judges them. Plans of former versions had clearances
+    among their constraints, in `former` order.
     """
     robot = problem.robot
     arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
@@ -24,7 +27,8 @@ def conditions_digest(problem: "Problem") -> str:
         (item.path.duration, item.task.value, item.chain.tip_name, item.chain.base)
         for item in problem.follows.items
     ]
-    judged = (*(item.path for item in problem.follows.items), *problem.all_constraints)
+    every = problem.all_constraints if former is None else former
+    judged = (*(item.path for item in problem.follows.items), *every)
     return digest_of(
         arm,
         own,

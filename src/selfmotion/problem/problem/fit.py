@@ -23,30 +23,25 @@ from selfmotion.model.path import FeedPossible, Path, check_oriented, spread_alo
 from selfmotion.model.robot import Chain, RobotModel
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Damping, Relaxation, Task
 from selfmotion.problem.constraints import (
-    Clearance,
     Constraint,
     JointAccelerationLimits,
     JointJerkLimits,
     JointPositionLimits,
     JointVelocityLimits,
     PositionDependentVelocityLimits,
-    ToolLimits,
 )
 from selfmotion.problem.costs import Cost, JointVelocity
 from selfmotion.problem.problem.least_tolerance import that_would_do
 
-# Default: links must not overlap; one object, so that its bodies are built once by arm.
-NO_OVERLAP = Clearance(distance=0.0)
 # Default null motion.
 ANY_NULL_MOTION = FreeNullMotion()
-# Default constraints.
-KEPT: tuple[Constraint, ...] = (
-    JointPositionLimits(),
-    JointVelocityLimits(),
+# Default constraints: limits that arms' makers publish, and with those of URDFs all.
+OF_MAKER: tuple[Constraint, ...] = (
     JointAccelerationLimits(),
     JointJerkLimits(),
     PositionDependentVelocityLimits(),
 )
+KEPT: tuple[Constraint, ...] = (JointPositionLimits(), JointVelocityLimits(), *OF_MAKER)
 # Stands for the usual cost of the problem's arm.
 USUAL_COSTS: tuple[Cost, ...] = (JointVelocity(),)
 
@@ -63,7 +58,6 @@ _KINDS: dict[str, Any] = {
     "path": Path,
     "null_motion": NullMotion,
     "damping": Damping | None,
-    "clearance": Clearance | None,
 }
 _EXAMPLES = {
     "robot": "RobotModel (load_robot)",
@@ -71,7 +65,6 @@ _EXAMPLES = {
     "null_motion": "NullMotion (selfmotion.motion.FreeNullMotion(), which is the default, "
     "PolynomialNullMotion(), BSplineNullMotion(…), or a class derived from NullMotion)",
     "damping": "Damping or None",
-    "clearance": "Clearance or None",
 }
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
@@ -201,7 +194,7 @@ def first_tool(several: Sequence[Follow], robot: RobotModel) -> tuple[Follow, Ro
 _BELOW = 0.98
 
 
-def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constraint]) -> None:
+def check_feeds(whose: str, paths: Sequence[Path], most: float) -> None:
     """Refuse feeds that paths do not keep by themselves, or that the tool may not have.
 
     A feed counts but for run-up, run-down and rounded corners; a motion that does not keep it there
@@ -213,7 +206,8 @@ def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constra
         Start of messages.
     paths : sequence of Path
         The paths, that of the tool first.
-    constraints : sequence of Constraint
+    most : float
+        Limit of the tool's speed [m/s]; inf for none.
 
     Raises
     ------
@@ -230,10 +224,9 @@ def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constra
                     possible=possible.feed,
                     time=found.time,
                 )
-    most = min((item.speed for item in constraints if isinstance(item, ToolLimits)), default=None)
     for found in paths[0].feeds:
         # The speed along the path is a lower bound of the total speed.
-        if most is not None and (1.0 - found.within) * found.asked > most:
+        if (1.0 - found.within) * found.asked > most:
             feed = _BELOW * most
             raise FeedError(
                 f"{whose}: the feed of {found.asked:g} m/s is faster than the tool may be, "

@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
+from warnings import warn
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
+    FormerUseWarning,
     ProblemError,
     Progress,
     as_flag,
@@ -33,9 +35,13 @@ from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 from selfmotion.problem.constraints import (
+    MOVED_CLEARANCE,
+    NO_OVERLAP,
     Clearance,
     Constraint,
     Envelope,
+    as_clearances,
+    said_once,
 )
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
@@ -48,7 +54,6 @@ from selfmotion.problem.problem.digest import conditions_digest
 from selfmotion.problem.problem.fit import (
     ANY_NULL_MOTION,
     KEPT,
-    NO_OVERLAP,
     SEQUENCES,
     USUAL_COSTS,
     check_costs,
@@ -108,10 +113,9 @@ class Problem:
         self-motion. By default none. A given start, or an end configuration, may use them; with
         other conditions there, the end is on the path itself; on a closed path, the deviation is
         closed, too. Of several paths the first is relaxed.
-    clearance : Clearance, optional
-        Minimum distance of the arm from itself and from obstacles, in addition to constraints: by
-        default its links must not overlap, where its URDF has bodies and no constraint is a
-        `Clearance`. None to leave that out; the verdict then says so.
+    clearance : Clearance or sequence of Clearance, optional
+        Minimum distance of the arm from itself and from obstacles: by default its links must not
+        overlap, where its URDF has bodies. None to leave that out; the verdict then says so.
     rest : bool
         Whether the arm is at rest where the path starts or ends at rest, which a controller needs,
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
@@ -149,7 +153,7 @@ class Problem:
     constraints: Sequence[Constraint] = KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
-    clearance: Clearance | None = NO_OVERLAP
+    clearance: Clearance | Sequence[Clearance] | None = NO_OVERLAP
     rest: bool = True
     also: Sequence[Follow] = ()
 
@@ -166,6 +170,13 @@ class Problem:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
+        constraints, clearances = said_once(self.constraints, self.clearance)
+        if len(constraints) < len(self.constraints):
+            object.__setattr__(self, "constraints", constraints)
+            # Of who called the class.
+            warn(MOVED_CLEARANCE.format("Problem"), FormerUseWarning, stacklevel=3)
+        one = clearances if len(clearances) > 1 else (*clearances, None)[0]
+        object.__setattr__(self, "clearance", one)
         check_fit(self.follows, self.relaxations, self.start)
         if isinstance(self.start, str):
             if self.start != "free":
@@ -265,31 +276,16 @@ class Problem:
         limits = BeyondLimits(_BEYOND_LIMITS, asked.lower, asked.upper, asked.speed)
         return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
-    @cached_property
-    def own_collision(self) -> Clearance | None:
-        """Clearance of the arm in addition to the constraints; None for none.
-
-        The default is left out where a constraint is a clearance, or the arm has no bodies; a given
-        one never is.
-        """
-        if self.clearance is not NO_OVERLAP:
-            return self.clearance
-        if not self.robot.urdf.has_collisions:
-            return None
-        if any(item.envelope(self.robot).bodies for item in self.constraints):
-            return None
-        return self.clearance
+    @property
+    def clearances(self) -> tuple[Clearance, ...]:
+        """All that is given as `clearance`."""
+        return as_clearances(self.clearance)
 
     @property
     def all_constraints(self) -> tuple[Constraint, ...]:
-        """The constraints that apply, with `own_collision` last if there is one."""
-        own = self.own_collision
-        return (*self.applying, *([] if own is None else [own]))
-
-    @property
-    def applying(self) -> tuple[Constraint, ...]:
-        """The given constraints that apply to the arm."""
-        return tuple(item for item in self.constraints if item.applies(self.robot))
+        """The constraints, and then the clearances, that apply to the arm."""
+        every = (*self.constraints, *self.clearances)
+        return tuple(item for item in every if item.applies(self.robot))
 
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
@@ -392,7 +388,7 @@ Problem.__init__.__annotations__["task"] = "Task | str"
 def check_feeds_of(problem: Problem) -> None:
     """Refuse feeds that no motion has; see `check_feeds`."""
     paths = [item.path for item in problem.follows.items]
-    check_feeds(problem.robot.name, paths, problem.constraints)
+    check_feeds(problem.robot.name, paths, problem.envelope_without_arm.tool_speed)
 
 
 def check_problem(problem: object) -> None:

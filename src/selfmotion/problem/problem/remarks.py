@@ -1,7 +1,6 @@
 """Notes on a problem before planning: suspicious limits, bodies or placements."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import coal
 import numpy as np
@@ -12,15 +11,7 @@ from selfmotion.model.collision import Body, Mesh, Obstacle, Solid, overlap_warn
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import TURN_NOTE, spread_along
 from selfmotion.model.robot import RobotModel, mounting_of
-from selfmotion.problem.constraints import (
-    Constraint,
-    Envelope,
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointVelocityLimits,
-    PositionDependentVelocityLimits,
-    ToolLimits,
-)
+from selfmotion.problem.constraints import Constraint, Envelope
 from selfmotion.problem.problem.fit import KEPT
 
 # Samples of a path.
@@ -67,12 +58,6 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
     return found
 
 
-# Limits this many times the arm's own are in other units.
-_FAR_ABOVE = 10.0
-# The same of limits that no joint has, by order of derivative: unit and value.
-_RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
-# Limit of the tool's speed that no arm has [m/s].
-_FASTEST_TOOL = 50.0
 # Meshes with more triangles are slow.
 _MANY_TRIANGLES = 200_000
 # A link larger than this many times its arm is in other units …
@@ -110,14 +95,14 @@ def remarks_on(
         yield from _body_remarks(robot, model.every_body)
         if said := overlap_warning(robot, model):
             yield said
-    yield from _unit_remarks(robot, constraints)
+    for item in constraints:
+        yield from item.remarks(robot)
     for item in constraints:
         # A default, or a limit that another constraint has, needs no note.
         known = (type(each) is type(item) and each.applies(robot) for each in constraints)
         if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
-            option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)
-            kind = type(item).__name__
-            key = "deceleration" if isinstance(item, PositionDependentVelocityLimits) else "limit"
+            option = f"{item.option}, or " if item.option else ""
+            kind, key = type(item).__name__, item.key
             yield (
                 f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
                 f'kept; give {option}in the file [[constraints]] kind = "{kind}", {key} = …, in '
@@ -144,26 +129,3 @@ def _body_remarks(robot: RobotModel, bodies: Sequence[Body]) -> Iterator[str]:
                 f"link '{body.name}' has a body {size:.3g} m long, and the arm reaches {reach:.3g} "
                 f'm; is its mesh in another unit? Then scale it (<mesh scale="0.001 0.001 0.001">)'
             )
-
-
-def _unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
-    """Yield limits so far above the arm's own, or any arm's, that they may be in other units."""
-    for item in constraints:
-        if isinstance(item, ToolLimits) and _FASTEST_TOOL < item.speed < np.inf:
-            yield f"ToolLimits: a speed of {item.speed:g} m/s is no limit; in mm/s? speed_mm"
-        limits = JointVelocityLimits | JointAccelerationLimits | JointJerkLimits
-        if not isinstance(item, limits) or item.limit is None:
-            continue
-        kind, (unit, most) = type(item).__name__, _RATES[item.order]
-        own, published = replace(item, replace=True).of(robot), item.published(robot)
-        for k, name in enumerate(robot.joint_names):
-            if robot.is_prismatic(name) or not np.isfinite(own[k]):
-                continue
-            said = ""
-            if not item.replace and own[k] > _FAR_ABOVE * published[k]:
-                said = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
-            elif own[k] > most:
-                said = f"is more than arms do (above {most:g} {unit})"
-            if said:
-                yield f"{kind}: {own[k]:g} {unit} for '{name}' {said}; in degrees? limit_deg"
-                break

@@ -13,9 +13,8 @@ from selfmotion.model.motion import NullMotion
 from selfmotion.model.path import Path
 from selfmotion.model.robot import LIMITS, RobotModel, rebuild_robot
 from selfmotion.model.task import Damping, Relaxation, Task
-from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.constraints import NO_OVERLAP, Constraint, said_once
 from selfmotion.problem.costs import cost_from_dict
-from selfmotion.problem.problem.fit import NO_OVERLAP
 from selfmotion.problem.problem.problem import Problem
 
 
@@ -29,7 +28,7 @@ def problem_to_dict(
     By default with the URDF's text, and without functions of the user's. A problem file names the
     arm instead, and raises for values that it cannot contain.
     """
-    start, clearance = problem.given_start, problem.clearance
+    start, apart = problem.given_start, [describe(item) for item in problem.clearances]
     document: dict[str, Any] = {
         "task": problem.task.value,
         "start": "free" if start is None else start.tolist(),
@@ -47,9 +46,9 @@ def problem_to_dict(
         ]
     if problem.damping is not None:
         document["damping"] = dataclasses.asdict(problem.damping)
-    if clearance != NO_OVERLAP:
+    if problem.clearance is not NO_OVERLAP:
         # Key of the first version of plan files.
-        document["collision"] = False if clearance is None else describe(clearance)
+        document["collision"] = apart if len(apart) > 1 else (*apart, False)[0]
     if not problem.rest:
         document["rest"] = False
     if problem.also:
@@ -104,9 +103,12 @@ def problem_from_dict(
     """
     known = {} if known is None else known
     robot, constraints = arm_and_constraints(values, known)
-    damping, clearance = values.get("damping"), values.get("collision", NO_OVERLAP)
-    if isinstance(clearance, Mapping):
-        clearance = _once(known, clearance, lambda: restore(Constraint, clearance))
+    damping, given = values.get("damping"), values.get("collision", NO_OVERLAP)
+    described = [given] if isinstance(given, Mapping) else given
+    if isinstance(described, list):
+        given = [_once(known, item, partial(restore, Constraint, item)) for item in described]
+    # Files of former versions have clearances among the constraints.
+    constraints, clearances = said_once(constraints, given or None)
     return Problem(
         robot,
         restore(Path, values["path"]),
@@ -117,7 +119,7 @@ def problem_from_dict(
         constraints,
         tuple(Relaxation(**item) for item in values.get("relaxations", ())),
         None if damping is None else Damping(**damping),
-        clearance or None,
+        clearances[0] if clearances == (NO_OVERLAP,) else clearances,
         values.get("rest", True),
         tuple(follow_from_dict(item) for item in values.get("also", ())),
     )

@@ -12,7 +12,8 @@ import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.model.collision import srdf_notes
-from selfmotion.problem.problem import KEPT, NO_OVERLAP
+from selfmotion.problem.constraints import NO_OVERLAP
+from selfmotion.problem.problem import OF_MAKER
 from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
 from selfmotion.shell.documents import joint_limit_notes, read_joint_limits
@@ -41,12 +42,7 @@ def requirements(
     """
     asked: list[sm.constraints.Constraint] = []
     if usual:
-        makers = (
-            sm.constraints.JointAccelerationLimits,
-            sm.constraints.JointJerkLimits,
-            sm.constraints.PositionDependentVelocityLimits,
-        )
-        asked += [item for item in KEPT if isinstance(item, makers) and item.applies(robot)]
+        asked += [item for item in OF_MAKER if item.applies(robot)]
     if velocity is not None:
         most = options.one_or_each(velocity, "--velocity")
         asked.append(sm.constraints.JointVelocityLimits(most))

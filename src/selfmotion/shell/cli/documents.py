@@ -112,7 +112,7 @@ class Shell:
             "constraints": self._constraints(arm),
             "relaxations": [_relaxation(text) for text in self.relax or []],
             "damping": self.damped,
-            "clearance": not self.no_collision,
+            "clearance": self._clearance(),
         }
         if self.degree is not None:
             table["null_motion"] = {"kind": "PolynomialNullMotion", "degree": self.degree}
@@ -197,26 +197,29 @@ class Shell:
             found.append({"kind": "PositionDependentVelocityLimits"})
         if self.closed:
             found.append({"kind": "ClosedPath"})
-        given = self.obstacles, self.srdf, self.disabled
-        if any(given) or self.clearance != 0.0:
-            if self.no_collision:
-                raise sm.errors.ProblemError(
-                    "--no-self-collision has no effect beside --obstacles, --clearance, --srdf and "
-                    "--disabled, which keep links apart from each other as well; leave out pairs "
-                    "by --disabled or --srdf"
-                )
-            bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
-            clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
-            if self.srdf is not None:
-                clearance["srdf"] = str(self.srdf)
-            if self.disabled:
-                clearance["disabled"] = options.disabled_pairs(self.disabled)
-            found.append(clearance)
         return found
+
+    def _clearance(self) -> bool | dict[str, Any]:
+        """Return the table of the clearance, or whether the default one applies."""
+        if not any((self.obstacles, self.srdf, self.disabled)) and self.clearance == 0.0:
+            return not self.no_collision
+        if self.no_collision:
+            raise sm.errors.ProblemError(
+                "--no-self-collision has no effect beside --obstacles, --clearance, --srdf and "
+                "--disabled, which keep links apart from each other as well; leave out pairs "
+                "by --disabled or --srdf"
+            )
+        bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
+        clearance: dict[str, Any] = {"obstacles": bodies, "distance": self.clearance}
+        if self.srdf is not None:
+            clearance["srdf"] = str(self.srdf)
+        if self.disabled:
+            clearance["disabled"] = options.disabled_pairs(self.disabled)
+        return clearance
 
 
 # Key of an entry of --obstacles in a table made of options.
-_ENTRY = re.compile(r"constraints\[\d+\]\.obstacles(\[\d+\])")
+_ENTRY = re.compile(r"clearance\.obstacles(\[\d+\])")
 # Options of the shell that say how --path is read; those of `plan` and of `check`.
 OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),

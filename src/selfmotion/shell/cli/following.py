@@ -418,8 +418,7 @@ def show_steps(
 
 def least_distance(result: sm.Plan) -> float:
     """Return how near bodies come from when the ball is there [m]."""
-    clearance = result.problem.constraints[-1]
-    model = clearance.model(result.robot)  # type: ignore[attr-defined]
+    model = result.problem.clearances[0].model(result.robot)
     motion = result.trajectory
     here = motion.t >= min(APPEARS, motion.t[-1])
     return float(min(model.distance(q).value for q in motion.q[here][::10]))

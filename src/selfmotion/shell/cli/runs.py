@@ -59,9 +59,9 @@ def panda_past_a_box() -> sm.Problem:
         sm.constraints.JointAccelerationLimits(),
         sm.constraints.JointJerkLimits(),
         sm.constraints.ClosedPath(),
-        sm.constraints.Clearance((box,), 0.01),
     )
-    return sm.Problem(panda, circle, "pointing", start, constraints=constraints)
+    apart = sm.constraints.Clearance((box,), 0.01)
+    return sm.Problem(panda, circle, "pointing", start, constraints=constraints, clearance=apart)
 
 
 @app.command(

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from selfmotion.basics import ANGLES, FORMER_CLEARANCE, LENGTHS, FileFormatError
-from selfmotion.shell.documents.models import document_model, path_model
+from selfmotion.shell.documents.models import clearance_model, document_model, path_model
 
 _UNITS = {"_deg": ANGLES, "_mm": LENGTHS}
 # Faults of a file that are told at once.
@@ -41,11 +41,15 @@ def checked(
             # Without damping there is none by default; self-collision is looked at.
             if on == (name == "damping"):
                 switched[name] = {} if on else None
+    several = raw.pop("clearance") if isinstance(raw.get("clearance"), list) else []
     try:
         found = document_model().model_validate(raw)
     except ValidationError as error:
         raise FileFormatError(_message(error, raw, written)) from error
     table = {**_given(found), **switched}
+    if several:
+        each = enumerate(several)
+        table["clearance"] = [_checked_clearance(item, f"clearance[{k}]") for k, item in each]
     table["path"] = _inner(table["path"], "path")
     for k, item in enumerate(table.get("also", [])):
         if "path" in item:
@@ -73,6 +77,17 @@ def _checked_path(given: Any, where: str) -> dict[str, Any]:
         mark = ": " if not said.startswith(".") else ""
         raise FileFormatError(f"{where}{mark}{said}") from error
     return _inner(_given(model)["path"], where)
+
+
+def _checked_clearance(given: Any, where: str) -> Any:
+    document = {"clearance": given}
+    try:
+        model = clearance_model().model_validate(document)
+    except ValidationError as error:
+        said = _message(error, document).removeprefix("clearance").removeprefix(": ")
+        mark = ": " if not said.startswith(".") else ""
+        raise FileFormatError(f"{where}{mark}{said}") from error
+    return _given(model)["clearance"]
 
 
 def _given(value: Any) -> Any:

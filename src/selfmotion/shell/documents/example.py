@@ -230,12 +230,11 @@ kind = "JointAccelerationLimits"  # those of the arm's maker, where known; or li
 [[constraints]]
 kind = "JointJerkLimits"
 {curves}
-# [[constraints]]
-# kind = "Clearance"
+# [clearance]          # in place of the clearance above
 # distance_mm = 10
 # srdf = "arm.srdf"
 #
-# [[constraints.obstacles]]  # box, sphere, cylinder, capsule, mesh
+# [[clearance.obstacles]]  # box, sphere, cylinder, capsule, mesh
 # shape = "box"
 # name = "post"
 # position = [0.0, -0.6, 0.6]

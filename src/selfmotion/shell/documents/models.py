@@ -162,6 +162,11 @@ def _path_model(known: tuple[type, ...]) -> type[BaseModel]:
     return _model("Inner", {"path": (_tool_motion(), ...)})
 
 
+def clearance_model() -> type[BaseModel]:
+    """Return the model of a table whose ``clearance`` is one of several."""
+    return _model("Inner", {"clearance": (model_of(Clearance, None, _clearance_fields()), ...)})
+
+
 def _tool_motion() -> Any:
     """Return the type of a tool motion."""
     return _one_of({**_kinds(Path), "file": _model("file", _PATH_FILE)}.values(), "kind")

@@ -29,7 +29,13 @@ from selfmotion.model.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_rob
 from selfmotion.model.task import Damping, Relaxation, Task
 from selfmotion.planning.optimise import LineSearch, QuasiNewton
 from selfmotion.planning.planner import PlanRequest, Search
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.constraints import (
+    NO_OVERLAP,
+    Clearance,
+    Constraint,
+    clearances_among,
+    said_once,
+)
 from selfmotion.problem.costs import Cost, FunctionCost
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents.joint_limits import joint_limit_notes, read_joint_limits
@@ -138,6 +144,13 @@ def _degrees_per_joint(document: Any, where: str = "") -> str:
     return ""
 
 
+# Note on a file that says a clearance as one of its constraints.
+_MOVED = (
+    'constraints: kind = "Clearance" is read for one more version; give the table [clearance], or '
+    "[[clearance]] of several"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class _Reader:
     """Makes the objects that a checked table describes."""
@@ -175,10 +188,20 @@ class _Reader:
         ):
             if name in table:
                 options[name] = self._each(name, make)
-        for name, kind in (("clearance", self._clearance), ("damping", lambda v: Damping(**v))):
-            if name in table:
-                with _named(file, name):
-                    options[name] = None if table[name] is None else kind(table[name])
+        if table.get("damping") is not None:
+            with _named(file, "damping"):
+                options["damping"] = Damping(**table["damping"])
+        if isinstance(table.get("clearance"), list):
+            options["clearance"] = self._each("clearance", self._clearance)
+        elif "clearance" in table:
+            with _named(file, "clearance"):
+                one = table["clearance"]
+                options["clearance"] = None if one is None else self._clearance(one)
+        if clearances_among(options.get("constraints", ())):
+            self.notes.append(_MOVED)
+            options["constraints"], options["clearance"] = said_once(
+                options["constraints"], options.get("clearance", NO_OVERLAP)
+            )
         with _named(file, ""):
             problem = Problem(robot, path, task, start, **options)
         if "joint_limits" in table:

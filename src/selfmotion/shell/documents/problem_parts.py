@@ -415,6 +415,7 @@ def _placed_follow(values: Mapping[str, Any], frame: SE3, carrier: str | None) -
 
 def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[str, Any]:
     """Return a table whose clearance looks at more bodies."""
+    # Files of before have it among the constraints.
     constraints = list(table.get("constraints", []))
     for k, item in enumerate(constraints):
         if item["kind"] == "Clearance":
@@ -422,11 +423,11 @@ def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[st
             return {**table, "constraints": constraints}
     clearance = table.get("clearance", {})
     if clearance is None:
-        raise ProblemError(
-            "workpiece: has bodies, but clearance is false, and no constraint is a Clearance"
-        )
-    several = [*clearance.get("obstacles", []), *bodies]
-    return {**table, "clearance": {"distance": 0.0, **clearance, "obstacles": several}}
+        raise ProblemError("workpiece: has bodies, but clearance is false; give its distance")
+    first, *rest = clearance if isinstance(clearance, list) else [clearance]
+    several = [*first.get("obstacles", []), *bodies]
+    found = {"distance": 0.0, **first, "obstacles": several}
+    return {**table, "clearance": [found, *rest] if rest else found}
 
 
 def belonging(document: Mapping[str, Any]) -> tuple[str, ...] | None:

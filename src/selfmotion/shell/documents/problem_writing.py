@@ -107,8 +107,10 @@ def problem_table(problem: Problem) -> dict[str, Any]:
     if "collision" in table:
         # Plans' files have the name that it had when their format was made.
         table["clearance"] = table.pop("collision")
-    if isinstance(table.get("clearance"), dict):
-        del table["clearance"]["kind"]
+    apart = table.get("clearance")
+    for item in apart if isinstance(apart, list) else [apart]:
+        if isinstance(item, dict):
+            del item["kind"]
     return {key: _without_none(value) for key, value in table.items()}
 
 

@@ -203,8 +203,9 @@ def json_schema() -> dict[str, Any]:
     known[_MOTION] = keys["path"]
     _made_of_others(known)
     keys |= {"path": _of(_MOTION), "seams": _seams(schema), "job": _job(schema)}
-    for name in ("clearance", "damping"):
-        keys[name] = {"anyOf": [_FLAG, keys[name]]}
+    one = keys["clearance"]
+    keys["clearance"] = {"anyOf": [_FLAG, one, {"type": "array", "items": one}]}
+    keys["damping"] = {"anyOf": [_FLAG, keys["damping"]]}
     schema["required"] = [name for name in schema["required"] if name != "path"]
     _note(schema)
     schema |= {

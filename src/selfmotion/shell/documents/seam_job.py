@@ -23,8 +23,8 @@ from selfmotion.basics import (
 from selfmotion.model.path import Feed, Path, Placed, pose_of, with_run_ups
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.problem.constraints import Clearance
-from selfmotion.problem.problem import NO_OVERLAP, Problem
+from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, said_once
+from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents.problem_file import job_of
 from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
@@ -120,13 +120,15 @@ class SeamJob:
         return tuple(map(self._problem, self.seams))
 
     def _problem(self, seam: Seam) -> Problem:
+        every = (*self.settings["constraints"], *seam.constraints)
+        constraints, clearances = said_once(every, self.settings.get("clearance", NO_OVERLAP))
         found = Problem(
             self.robot,
             seam.path,
             seam.task,
-            constraints=(*self.settings["constraints"], *seam.constraints),
+            constraints=constraints,
             relaxations=tuple(seam.relaxations),
-            clearance=self.settings.get("clearance", NO_OVERLAP),
+            clearance=clearances,
         )
         return found if seam.costs is None else replace(found, costs=tuple(seam.costs))
 
@@ -214,19 +216,17 @@ def seam_job_of(
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first
-    apart = [item for item in whole.problem.constraints if isinstance(item, Clearance)]
+    apart = whole.problem.clearances
     if len(apart) > 1:
-        raise FileFormatError(f"{file}: constraints: two clearances, expected one for all")
+        raise FileFormatError(f"{file}: clearance: {len(apart)} are given, expected one for all")
     options = reader.settings(settings)
-    kept = [item for item in reader.shared if not isinstance(item, Clearance)]
-    clearance = apart[0] if apart else whole.problem.clearance
-    if apart or whole.problem.clearance is not NO_OVERLAP:
-        options["clearance"] = clearance
+    if whole.problem.clearance is not NO_OVERLAP:
+        options["clearance"] = apart[0] if apart else None
     is_cut = any(UNJUDGED in seam.path.notes for seam in seams)
     return SeamJob(
         whole.problem.robot,
         tuple(seams),
-        {**options, "constraints": kept},
+        {**options, "constraints": list(whole.problem.constraints)},
         unjudged=(UNJUDGED,) if is_cut else (),
         notes=(*whole.notes, *([_RENAMED] if FORMER_SECONDS in settings else [])),
     )
@@ -264,7 +264,6 @@ class _Reader:
         self._file, self._shared, self._code, self._memory = file, shared, allow_code, memory
         # The arm and what all keep, read with any motion at all.
         self.first = self._read({"path": _ANY}, "seams")
-        self.shared = list(self.first.problem.constraints)
         self._standing = standing(shared)
 
     def of_list(self, given: Any) -> list[Seam]:
@@ -393,7 +392,7 @@ class _Reader:
         if constraints:
             document["constraints"] = [*whole, *constraints]
         problem = self._read(document, where).problem
-        besides = list(problem.constraints)[len(whole) :] if constraints else []
+        besides = _besides(problem, whole, constraints)
         values = {key: value for key, value in in_si(given).items() if key in SEAM}
         try:
             leaves = [self._left(in_si(item)) for item in values.pop("leaves", [])]
@@ -438,6 +437,19 @@ class _Reader:
                 )
         if not all(isinstance(item, Mapping) for item in given.get("leaves", ())):
             raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
+
+
+def _besides(problem: Problem, shared: Sequence[Any], own: Sequence[Any]) -> list[Constraint]:
+    """Return what a seam's own tables of constraints are read as, after those that it shares."""
+    (before, _), (mine, others) = _by_kind(shared), _by_kind(own)
+    apart = problem.clearances[before : before + mine]
+    return [*(problem.constraints[-others:] if others else ()), *apart]
+
+
+def _by_kind(tables: Sequence[Any]) -> tuple[int, int]:
+    """Return how many tables of constraints are clearances, and how many are not."""
+    count = sum(item.get("kind") == Clearance.kind for item in tables)
+    return count, len(tables) - count
 
 
 def _run_up(

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from selfmotion.basics import Array
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.result import Plan
-from selfmotion.problem.constraints import Clearance
 from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
@@ -95,7 +94,7 @@ class _Motion:
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
         # How far apart bodies have to be [m].
-        self.asked = max((item.distance for item in _clearances(plan)), default=0.0)
+        self.asked = max((item.distance for item in plan.problem.clearances), default=0.0)
         self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
         self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
 
@@ -190,10 +189,6 @@ def plan_content(
         "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
         "table": _facts([plan], whole) if beside is None else _compared(plan, beside),
     }
-
-
-def _clearances(plan: Plan) -> list[Clearance]:
-    return [item for item in plan.problem.all_constraints if isinstance(item, Clearance)]
 
 
 def _layers(motions: list[_Motion]) -> list[Json]:
@@ -369,7 +364,8 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
 
 def _joints(plan: Plan) -> list[Json]:
     robot, asked = plan.robot, torque_limits(plan)
-    effort = robot.effort_limit if asked is None else asked.of(robot)
+    # Further ones are of joints that mimic others.
+    effort = robot.effort_limit if asked is None else asked.bounds[: robot.dof]
     return [
         {
             "name": name,

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
+from selfmotion.certificate import Quantity
 from selfmotion.model.collision import CollisionModel
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.motion import Trajectory
@@ -15,7 +16,6 @@ from selfmotion.model.robot import RobotModel, null_space
 from selfmotion.model.task import SE3, Task
 from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
-from selfmotion.problem.constraints import JointTorqueLimits
 from selfmotion.problem.problem import Problem
 
 # A plan's motion, sampled for a page: key frames of the links, and curves over time.
@@ -174,10 +174,10 @@ class Curves:
         return np.asarray(turned + self.carrier[:, :3, 3])
 
 
-def torque_limits(plan: Plan) -> JointTorqueLimits | None:
-    """Return what a plan was asked about torques, with what the tool holds; None for nothing."""
-    asked = (item for item in plan.problem.constraints if isinstance(item, JointTorqueLimits))
-    return next(asked, None)
+def torque_limits(plan: Plan) -> Quantity | None:
+    """Return the torques that a plan limits, with what the tool holds; None for none."""
+    asked = (item for item in plan.problem.constraints if item.load is not None)
+    return next((item.quantity(plan.robot) for item in asked), None)
 
 
 def curves(
@@ -214,7 +214,7 @@ def curves(
         q=q,
         qd=qd,
         qdd=qdd,
-        torque=None if asked is None else asked.quantity(plan.robot).values(q, qd, qdd),
+        torque=None if asked is None else asked.values(q, qd, qdd),
         manipulability=manipulability,
         position_error=maximum_filter1d(errors[:, 0], window),
         rotation_error=maximum_filter1d(errors[:, 1], window),

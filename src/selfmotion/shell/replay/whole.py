@@ -16,7 +16,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.result import Move, Parts, Plan, Report
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.constraints import NO_OVERLAP, Constraint, clearances_among
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.replay import scene, three
 from selfmotion.shell.replay.meshes import Json, Payload
@@ -211,7 +211,7 @@ class Whole:
             constraints = tuple(first.constraints) if isinstance(first, Move) else ()
             known = list(made.obstacles)
         elif isinstance(made, Parts):
-            constraints, known = tuple(made.problem.constraints), list(made.plans[0].obstacles)
+            constraints, known = made.problem.all_constraints, list(made.plans[0].obstacles)
         else:
             constraints, known = made.constraints, list(made.obstacles)
         unique = {item.name: item for item in known}
@@ -335,9 +335,9 @@ def stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...
     free = [task for task in tasks if robot.redundancy(task) > 0]
     if not free:
         raise ProblemError(f"{robot.name}: has no redundancy in position, which a replay shows")
-    apart = [item for item in asked if isinstance(item, Clearance)]
     path = _Performed(robot, motion)
-    problem = Problem(robot, path, free[0], constraints=apart, rest=False)
+    apart = clearances_among(asked) or NO_OVERLAP
+    problem = Problem(robot, path, free[0], constraints=(), clearance=apart, rest=False)
     return unproved(problem, motion)
 
 

@@ -19,7 +19,7 @@ from selfmotion.certificate import (
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper import MinimumNormMotion, Objective, node_tangents
 from selfmotion.planning.search import start_candidates
 from selfmotion.problem.constraints import BoundConstraint, Constraint, linearised
 from selfmotion.problem.problem import Problem
@@ -140,7 +140,7 @@ def _check_derivatives(objective: Objective, bound: BoundConstraint) -> None:
     def weighed(x: Array) -> float:
         return float(np.sum(weights * bound.residual(objective.samples(x))))
 
-    tangents = bound.tangents(objective.samples(x), objective.node_tangents(x))
+    tangents = bound.tangents(objective.samples(x), node_tangents(objective, x))
     shape = (*weights.shape, objective.size)
     told = f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected {shape}"
     require(np.shape(tangents) == shape, told)
@@ -151,7 +151,7 @@ def _check_derivatives(objective: Objective, bound: BoundConstraint) -> None:
 
 def _known_on_demand(objective: Objective, bound: BoundConstraint, table: Array, x: Array) -> None:
     """Require that derivatives computed as far as they are asked for are those of the table."""
-    motion = objective.node_tangents(x)
+    motion = node_tangents(objective, x)
     rows, name = linearised(bound, objective.samples(x), motion), f"constraint '{bound.name}'"
     told = f"{name}: linearised_at() knows {rows.count} conditions, expected {len(table)}"
     require(rows.count == len(table), told)

@@ -12,7 +12,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
-from selfmotion.problem.constraints import Constraint, JointTorqueLimits
+from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.program_settings import (
     ProgramSettings,
     flange_of,
@@ -216,15 +216,14 @@ def _slides(robot: RobotModel, joint: str) -> bool:
 
 def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange: str) -> list[Load]:
     """Return the load at the flange in each constraint of torques, by payload and URDF."""
-    limits = [item for item in constraints if isinstance(item, JointTorqueLimits)]
-    if not limits:
+    held = [item.load for item in constraints if item.load is not None]
+    if not held:
         return []
     settings = ProgramSettings(flange=flange or None)
     tool, own = tool_from_flange(robot, settings), _beyond(robot, flange)
     found = []
-    for item in limits:
-        at = tool.act(np.asarray(item.center, dtype=np.float64).reshape(3))
-        found.append(_together([*own, Load(float(item.payload), np.asarray(at))]))
+    for mass, center in held:
+        found.append(_together([*own, Load(mass, np.asarray(tool.act(center)))]))
     return found
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from selfmotion.basics import Array, PlanError, ProblemError, shown
 from selfmotion.model.motion import MOST_SAMPLES, Trajectory
 from selfmotion.planning.result import Move, Parts, Plan, at_rate, is_retimed
-from selfmotion.problem.constraints import ClosedPath, EndVelocity, StartVelocity
 from selfmotion.work.job import Program
 
 # Decimals of times in messages [s]: whole nanoseconds.
@@ -247,8 +246,7 @@ def moving_ends(plan: Plan | Parts | Move | Program) -> str:
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     constraints = plan.problem.constraints if isinstance(plan, Plan) else ()
     allowed = [
-        any(isinstance(item, kind | ClosedPath) for item in constraints)
-        for kind in (StartVelocity, EndVelocity)
+        any(item.ends.velocity[end] or item.ends.closes for item in constraints) for end in (0, 1)
     ]
     if isinstance(plan, Plan) and not plan.problem.rest:
         allowed = [True, True]

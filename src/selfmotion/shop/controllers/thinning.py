@@ -16,10 +16,6 @@ from selfmotion.model.task import Task
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.problem.constraints import (
     Constraint,
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointTorqueLimits,
-    ToolLimits,
 )
 from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.segments import (
@@ -136,8 +132,8 @@ def by_targets(problem: Problem) -> Problem:
 
 def constraints_of_targets(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that targets can keep: accelerations are the controller's own."""
-    own = (JointAccelerationLimits, JointJerkLimits)
-    return tuple(item for item in constraints if not isinstance(item, own))
+    kept = (item.for_controller() for item in constraints)
+    return tuple(item for item in kept if item is not None)
 
 
 def constraints_of_lines(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -145,13 +141,8 @@ def constraints_of_lines(constraints: Sequence[Constraint]) -> tuple[Constraint,
 
     Nor torques, then, which are judged along the smooth curve.
     """
-    return tuple(
-        replace(item, acceleration=np.inf, turn_acceleration=np.inf)
-        if isinstance(item, ToolLimits)
-        else item
-        for item in constraints_of_targets(constraints)
-        if not isinstance(item, JointTorqueLimits)
-    )
+    kept = (item.for_controller(lines=True) for item in constraints)
+    return tuple(item for item in kept if item is not None)
 
 
 def _move_operation(name: str, move: Move) -> Operation:

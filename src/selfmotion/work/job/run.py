@@ -37,8 +37,14 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import Deadline
 from selfmotion.planning.result import Move, arm_digest
 from selfmotion.planning.transfer import FreeMotions
-from selfmotion.problem.constraints import Clearance, Constraint
-from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
+from selfmotion.problem.constraints import (
+    NO_OVERLAP,
+    Clearance,
+    Constraint,
+    as_clearances,
+    clearances_among,
+)
+from selfmotion.problem.problem import KEPT, check_all_times, check_feeds, envelope_without_arm
 from selfmotion.work.job.files import EarlierProgram, ResultCache, check_earlier
 from selfmotion.work.job.obstructing import ObstructingBuilder
 from selfmotion.work.job.order import EXACT
@@ -282,7 +288,8 @@ def plan_job(
     clock = Deadline.after(deadline)
     told = clock.checked_by(obeying(progress))
     for seam in sorted(listed, key=_slowest):
-        check_feeds(f"seam '{seam.name}'", [seam.path], [*settings.constraints, *seam.constraints])
+        kept = envelope_without_arm(robot, [*settings.constraints, *seam.constraints])
+        check_feeds(f"seam '{seam.name}'", [seam.path], kept.tool_speed)
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     if folder is not None or executor is not None:
         for seam in listed:
@@ -384,19 +391,19 @@ def _slowest(seam: Seam) -> float:
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     listed = as_several(constraints, "constraints", Constraint)
     check_all_times(listed, "give it to a seam that has one direction (either_way=False)")
-    for item in listed:
-        if isinstance(item, Clearance):
-            raise ProblemError(
-                "a Clearance is among the constraints of the job; give it as clearance=, so that "
-                "what seams leave behind is kept clear of as well"
-            )
+    if clearances_among(listed):
+        raise ProblemError(
+            "a Clearance is among the constraints of the job; give it as clearance=, so that "
+            "what seams leave behind is kept clear of as well"
+        )
     return listed
 
 
 def _checked_clearance(clearance: object) -> Clearance | None:
-    if clearance is not None and not isinstance(clearance, Clearance):
-        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
-    return clearance
+    given = as_clearances(clearance)
+    if len(given) > 1:
+        raise ProblemError(f"clearance has {len(given)} items, expected one Clearance for a job")
+    return given[0] if given else None
 
 
 def _check_names(seams: Sequence[Seam]) -> None:

@@ -12,8 +12,8 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import NodeNullMotion, NullMotion, Trajectory, reversed_motion
 from selfmotion.model.path import REST_SPEED, Path, Reversed
 from selfmotion.model.task import Relaxation, Task
-from selfmotion.planning.result import Move, Plan, keeps_as_far
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.planning.result import Move, Plan
+from selfmotion.problem.constraints import Clearance, Constraint, clearances_among
 from selfmotion.problem.costs import Cost
 from selfmotion.problem.problem import Problem, rest_orders
 from selfmotion.work.job.stops import Precedences
@@ -104,8 +104,8 @@ class Step:
 
     def _bodies_kept_clear_of(self, clearance: Clearance) -> tuple[Obstacle, ...]:
         """Return the bodies from which it keeps the distance of a clearance, or more."""
-        far = (item for item in self.constraints if keeps_as_far(item, clearance))
-        return tuple(body for item in far if isinstance(item, Clearance) for body in item.obstacles)
+        far = (item for item in clearances_among(self.constraints) if item.keeps_as_far(clearance))
+        return tuple(body for item in far for body in item.obstacles)
 
 
 def _same(one: Obstacle | None, other: Obstacle) -> bool:
@@ -258,7 +258,7 @@ def are_opposite(one: str, other: str) -> bool:
 
 def one_way(constraint: Constraint) -> bool:
     """Whether a constraint asks something of one end of a motion."""
-    return constraint.on_part() is not constraint or constraint.on_last_part() is not constraint
+    return constraint.ends.is_about(0) or constraint.ends.is_about(1)
 
 
 def reversing(duration: float) -> Callable[[Array], Array]:

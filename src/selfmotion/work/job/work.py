@@ -31,7 +31,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import branches, from_start, like_before, near_start
 from selfmotion.planning.result import ArmCache, Move, Plan, load_move, load_plan
 from selfmotion.planning.transfer import FreeMotions, constraints_of_moves
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.constraints import Clearance, Constraint, said_once
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import (
     Problem,
@@ -94,13 +94,15 @@ class JobSettings:
 
     def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
         """Return the problem of a seam, with further obstacles."""
+        every = (*self.constraints, *seam.constraints)
+        constraints, clearances = said_once(every, self.clearance_from(obstacles))
         given = Problem(
             self.robot,
             seam.path,
             seam.task,
-            constraints=(*self.constraints, *seam.constraints),
+            constraints=constraints,
             relaxations=tuple(seam.relaxations),
-            clearance=self.clearance_from(obstacles),
+            clearance=clearances,
         )
         if seam.costs is not None:
             given = replace(given, costs=tuple(seam.costs))

@@ -27,7 +27,6 @@ from selfmotion.basics import (
 )
 from selfmotion.model.path import spread_along
 from selfmotion.planning.result import Plan
-from selfmotion.problem.constraints import Clearance
 from selfmotion.work.placement.places import COORDINATES, Places, Tried, places_of
 
 # Two motions are near each other while no joint differs by more than this [rad or m].
@@ -189,11 +188,9 @@ def correction(
 
 
 def _fixed_obstacles(plan: Plan) -> tuple[str, ...]:
-    items = (*plan.problem.constraints, plan.problem.clearance)
     return tuple(
         body.name
-        for item in items
-        if isinstance(item, Clearance)
+        for item in plan.problem.clearances
         for body in item.obstacles
         if body.frame is None
     )

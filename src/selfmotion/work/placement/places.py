@@ -177,13 +177,11 @@ class Places:
             item.along(_placed(bound, by)) if _stands(bound) else item
             for item, bound in zip(problem.also, items[1:], strict=True)
         )
-        bodies, clearance = self.bodies, problem.clearance
         return problem.changed(
             path=_placed(items[0], by),
             also=also,
             start="free",
-            constraints=tuple(_with_bodies(item, bodies, by) for item in problem.constraints),
-            clearance=None if clearance is None else _with_bodies(clearance, bodies, by),
+            clearance=[_with_bodies(item, self.bodies, by) for item in problem.clearances],
         )
 
 
@@ -211,8 +209,7 @@ def places_of(
     standing = {
         body.name: body
         for problem in problems
-        for item in (*problem.constraints, problem.clearance)
-        if isinstance(item, Clearance)
+        for item in problem.clearances
         for body in item.obstacles
         if body.frame is None
     }
@@ -325,10 +322,8 @@ def _placed(item: BoundTaskFrame, by: SE3) -> Path:
     return Placed(item.path, frame.inverse() * by * frame)
 
 
-def _with_bodies(item: Any, names: frozenset[str], by: SE3) -> Any:
-    """Return a constraint whose obstacles stand elsewhere, by name."""
-    if not isinstance(item, Clearance):
-        return item
+def _with_bodies(item: Clearance, names: frozenset[str], by: SE3) -> Clearance:
+    """Return a clearance whose obstacles stand elsewhere, by name."""
 
     def moves(body: Obstacle) -> bool:
         return body.frame is None and body.name in names

@@ -28,7 +28,7 @@ from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
-from selfmotion.problem.constraints import Clearance
+from selfmotion.problem.constraints import Clearance, said_once
 from selfmotion.problem.problem import Problem, check_problem
 from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
 
@@ -229,8 +229,9 @@ class _MarginSearch:
         for number in range(_ROUNDS):
             progress("margin", number + 1, _ROUNDS)
             clearances = _adjusted(self.now.clearances, self.now.found, clearance)
-            pairs = _of_pairs(problem, clearances)
-            raised = narrow.changed(constraints=(*narrow.constraints, *pairs))
+            # Pairs of bodies take the place of the default.
+            _, raised_clearances = said_once(_of_pairs(problem, clearances), narrow.clearance)
+            raised = narrow.changed(clearance=raised_clearances)
             again = plan(raised, warm_start=self.now.plan, **options)
             if not number and not _is_interrupted(again):
                 # Past bodies there are several routes; another one may be shorter now.
@@ -307,12 +308,7 @@ def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]
 def _of_pairs(problem: Problem, clearances: dict[tuple[str, str], float]) -> list[Clearance]:
     """Return clearances of single pairs of bodies."""
     found = []
-    bodies = {
-        body.name: body
-        for item in (*problem.constraints, problem.clearance)
-        if isinstance(item, Clearance)
-        for body in item.obstacles
-    }
+    bodies = {body.name: body for item in problem.clearances for body in item.obstacles}
     for pair, distance in clearances.items():
         own = tuple(bodies[name] for name in pair if name in bodies)
         every = dict.fromkeys(CollisionModel(problem.robot, own).pairs)

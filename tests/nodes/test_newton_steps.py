@@ -1,0 +1,198 @@
+"""Single steps of Newton's method: what they predict, how far they go, and why they end."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.planning.nodes import NodeMotion, Step, minimise, newton
+from selfmotion.planning.nodes.motion import moved_along
+from selfmotion.planning.nodes.newton import _merit, _raise_merit_penalty, _Solver
+from selfmotion.planning.nodes.newton_system import Change, Model, System
+from selfmotion.planning.nodes.settings import SETTINGS
+from selfmotion.planning.optimise import Status
+from selfmotion.problem.costs import Partials, Samples
+from support.arms import PANDA_HOME, start_of
+from support.nodes import centred, moved, nodes_of, problem_of
+
+# A motion that is closed up to this at its last node [rad].
+OFF = 1e-3
+# Share of Newton's step by which merit functions are differentiated.
+NEAR = 1e-5
+# Of such differences; of a quadratic form against the system without what is added to its diagonal.
+DIFFERENCE, DIAGONAL = 1e-3, 1e-3
+
+
+def problem(panda: sm.RobotModel, *constraints: sm.constraints.Constraint, **more) -> sm.Problem:
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    return problem_of((panda, "pose", PANDA_HOME, path), constraints=constraints, **more)
+
+
+def bound(panda: sm.RobotModel, *, closed: bool = True) -> NodeMotion:
+    """Return a motion that violates limits, and, of a closed one, does not end where it starts."""
+    ends = [sm.constraints.ClosedPath()] if closed else []
+    return nodes_of(problem(panda, sm.constraints.JointVelocityLimits(1.0), *ends), 16)
+
+
+def stepped(solver: _Solver) -> tuple[Model, Change]:
+    model = Model.of(solver.motion, solver._rows, solver._end_multipliers)
+    assert model is not None
+    system = solver._system(model)
+    assert system is not None
+    return model, solver._step(system)
+
+
+def never(step: Step) -> bool:
+    return False
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("before", [0, 1, 4])
+def test_a_step_is_a_direction_of_descent_as_steep_as_it_predicts(
+    panda: sm.RobotModel, before: int, closed: bool
+) -> None:
+    solver = _Solver(bound(panda, closed=closed), None, SETTINGS.mu_first, roughly=False)
+    for _ in range(before):
+        assert solver.advance(never) is None
+    _, step = stepped(solver)
+    assert len(step.slacks)
+    assert bool(len(step.end_multipliers)) is closed
+    check_descent(solver)
+
+
+def check_descent(solver: _Solver) -> float:
+    """The derivative of the merit function is as predicted, and negative enough.
+
+    Returns that of cost and barrier terms alone.
+    """
+    model, step = stepped(solver)
+
+    def merit(share: float) -> float:
+        motion = moved_along(solver.motion, share * step.nodes, model.around.changes)
+        assert motion is not None
+        slacks, elastics = solver._slacks, solver._elastics
+        return _merit(
+            solver, motion, slacks + share * step.slacks, elastics + share * step.elastics
+        )
+
+    def slope() -> float:
+        return (merit(NEAR) - merit(0.0)) / NEAR
+
+    solver._merit_penalty = 0.0
+    without = slope()
+    predicted = _raise_merit_penalty(solver, model, step)
+    assert predicted == pytest.approx(slope(), rel=DIFFERENCE)
+    # However costs and barriers rise along it.
+    assert predicted <= -abs(without) * (1.0 - DIFFERENCE)
+    assert solver._merit_penalty > np.abs(step.end_multipliers).max(initial=0.0)
+    return without
+
+
+def test_a_step_that_has_to_raise_the_cost_is_a_direction_of_descent(planar: sm.RobotModel) -> None:
+    """Beside an optimum, to the side on which the cost is lower and the ends do not meet."""
+    start = start_of(planar, "planar")
+    circle = sm.paths.Circle.around(planar.pose(start), 0.2, 4.0, normal=(0.0, 0.0, 1.0))
+    closed = [sm.constraints.ClosedPath()]
+    begin = nodes_of(problem_of((planar, "planar", start, circle), constraints=closed), 16)
+    found = minimise(begin, never)
+    assert found.status is Status.CONVERGED
+    slopes = []
+    for side in (-1.0, 1.0):
+        step = np.zeros((len(found.motion.nu), 3))
+        step[:, 0] = side * OFF * np.linspace(0.0, 1.0, len(step)) ** 2
+        beside = centred(moved(found.motion, step))
+        slopes.append(check_descent(_Solver(beside, None, SETTINGS.mu_first, roughly=False)))
+    assert max(slopes) > 0.0
+
+
+def test_what_a_step_promises_is_its_quadratic_form(panda: sm.RobotModel) -> None:
+    """With the matrix K of the system, the decrease of the barrier problem is pᵀKp."""
+    solver = _Solver(bound(panda), None, SETTINGS.mu_first, roughly=False)
+    for _ in range(3):
+        assert solver.advance(never) is None
+    model, step = stepped(solver)
+    own = solver._rows
+    matrix = model.stiffened(own.of_all(own.stiff)).banded()
+    matrix.add(0, 0, model.around.curvature)
+    flat = step.nodes.ravel()
+    quadratic = float(flat @ matrix.dense() @ flat)
+    # What is added to the diagonal of a matrix that is not positive definite would count as well.
+    assert solver._shift == 0.0
+    assert step.promised == pytest.approx(quadratic, rel=DIAGONAL)
+    # For another μ the same system has another step.
+    system = System.of(solver.motion, model, own, solver._barrier, 0.0)
+    assert system is not None
+    softer = system.step(30.0 * solver._barrier)
+    flat = softer.nodes.ravel()
+    assert softer.promised == pytest.approx(float(flat @ matrix.dense() @ flat), rel=DIAGONAL)
+
+
+def test_no_coordinate_changes_more_in_one_step_than_allowed(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = sm.costs.Posture(100.0, posture=PANDA_HOME + 1.5)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 4.0)
+    begin = nodes_of(problem_of((panda, "position", PANDA_HOME, path), costs=[far]), 2, free=True)
+    changes: list[float] = []
+
+    def seen(motion: NodeMotion, step: np.ndarray, by: np.ndarray) -> NodeMotion | None:
+        changes.append(float(np.abs(step[:, : motion.nu.shape[1]]).max()))
+        return moved_along(motion, step, by)
+
+    monkeypatch.setattr(newton, "moved_along", seen)
+    found = minimise(begin, never)
+    assert found.status is Status.CONVERGED
+    # Whole steps would be longer.
+    assert max(changes) == pytest.approx(SETTINGS.max_change)
+
+
+def test_quadratic_convergence_spares_the_last_system(panda: sm.RobotModel) -> None:
+    steps: list[Step] = []
+    found = minimise(nodes_of(problem(panda), 16), lambda step: bool(steps.append(step)))
+    assert found.status is Status.CONVERGED
+    # The gradient is not computed where the last full step has predicted its own error.
+    assert steps[-1].slope == 0.0
+    assert steps[-1].length == 1.0
+    assert steps[-2].slope > 0.0
+
+
+class Uphill(sm.costs.JointVelocity):
+    """A cost whose gradient points the wrong way."""
+
+    def gradient(self, samples: Samples) -> Partials:
+        return Partials(qd=-samples.qd)
+
+
+@pytest.mark.parametrize("conditions", ["rows", "ends"])
+def test_where_no_step_is_accepted_conditions_may_be_the_reason(
+    panda: sm.RobotModel, conditions: str
+) -> None:
+    """A wrong gradient and rows, or conditions on the ends, that contradict it look alike."""
+    constraint = (
+        sm.constraints.JointVelocityLimits(0.6)
+        if conditions == "rows"
+        else sm.constraints.ClosedPath()
+    )
+    found = minimise(nodes_of(problem(panda, constraint, costs=[Uphill()]), 16), never)
+    assert found.status is Status.INFEASIBLE
+
+
+def test_settings_are_within_the_ranges_of_their_sources() -> None:
+    """Wächter and Biegler 2006, section 4; Nocedal and Wright 2006, chapters 3 and 19."""
+    assert all(getattr(SETTINGS, field.name) > 0 for field in fields(SETTINGS))
+    for name in (
+        *("kappa_mu", "tau", "armijo", "backtracking", "kappa_minus", "saturated", "stall_factor"),
+        *("min_merit_penalty", "inactive_share", "min_length", "quadratic_share", "delta_first"),
+        *("cost_tolerance", "row_tolerance", "end_tolerance", "barrier_row_tolerance"),
+    ):
+        assert getattr(SETTINGS, name) < 1.0, name
+    for name in ("theta_mu", "kappa_plus", "kappa_epsilon", "rho_factor", "rough_factor"):
+        assert getattr(SETTINGS, name) > 1.0, name
+    assert SETTINGS.theta_mu < 2.0
+    assert SETTINGS.mu_last < SETTINGS.mu_warm < SETTINGS.mu_first
+    assert SETTINGS.cost_tolerance < SETTINGS.cost_tolerance_with_rows < SETTINGS.rounding
+    assert SETTINGS.max_change < SETTINGS.max_trusted
+    with pytest.raises(AttributeError):
+        SETTINGS.tau = 0.5  # type: ignore[misc]
+    assert replace(SETTINGS, tau=0.9).tau == 0.9
