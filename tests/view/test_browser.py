@@ -1,6 +1,7 @@
 """The page in a browser: what is dragged and slid is planned, and nothing leaves this machine."""
 
 import re
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -8,9 +9,12 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import ProblemError
+from selfmotion.shell.view import opened as open_page
 from support.dragging import drag, settled, turn
+from support.industrial import two_seams
 from support.layouts import WIDTHS, chromium, faults
-from support.views import CIRCLE, Served, served
+from support.views import CIRCLE, Heard, Served, served
 
 # A page that plans in a browser without a graphics card takes seconds for each drag.
 pytestmark = pytest.mark.site
@@ -244,3 +248,34 @@ def test_it_is_seen_whole(page: Any, server: Served) -> None:
     for width in WIDTHS:
         assert faults(page, TEXTS, BOXES, width) == [], width
     page.set_viewport_size({"width": 640, "height": 480})
+
+
+def test_a_controllers_program_is_judged_by_its_job(tmp_path: Path) -> None:
+    """As `selfmotion check` does: what is wrong with it is said, and its seam is red."""
+    program = two_seams()
+    job, file = tmp_path / "job.program", tmp_path / "job.src"
+    program.save(job)
+    signals = {"arc on": (1, True), "arc off": (1, False)}
+    # The page writes it as its settings say.
+    sitting = open_page(job)
+    with pytest.raises(ProblemError, match="has no signal"):
+        sitting.export(".src")
+    sitting.settings = sm.files.ProgramSettings(signals=signals)
+    file.write_bytes(sitting.export(".src"))
+    shown = Heard(open_page(file, job=job)).messages[-1]
+    assert shown["plans"][0]["verified"]
+    names = [step["name"] for step in shown["plans"][0]["steps"]]
+    assert names == [step.name for step in program.steps]
+    broken = tmp_path / "broken.src"
+    # One target in the middle is taught elsewhere.
+    targets = list(re.finditer(r"A1 (-?[\d.]+)", file.read_text()))
+    first, last = targets[len(targets) // 2].span(1)
+    text = file.read_text()
+    broken.write_text(f"{text[:first]}{float(text[first:last]) + 2.0:.6f}{text[last:]}")
+    shown = Heard(open_page(broken, job=job)).messages[-1]
+    assert shown["words"].startswith("not verified: ")
+    assert not shown["plans"][0]["verified"]
+    with pytest.raises(ProblemError, match=r"give the \.program that it was made of as --robot"):
+        open_page(file)
+    with pytest.raises(ProblemError, match="has no use for --robot"):
+        open_page(job, job=job)

@@ -8,7 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.path import spread_along
 from selfmotion.model.task import SE3
-from selfmotion.shell.view.floor import floor_of
+from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.handles import handles_of
 from support.views import CIRCLE
 
@@ -38,7 +38,10 @@ def in_reach(problem, by):
 @pytest.mark.parametrize(("name", "way"), [("path", 1.0), ("base", -1.0)])
 def test_places_are_green_where_the_path_is_in_reach(problem, name, way):
     handle = handles_of(tomllib.loads(CIRCLE), problem)[name]
-    found = floor_of([problem], [problem.robot.home[None]], handle)
+    assert Floor.can_move([problem], handle)
+    found = Floor([problem], [problem.robot.home[None]], handle)
+    while not found.is_done:
+        found.look()
     here = (handle.prefix * handle.pose).translation[:2]
     for reached, count in ((True, GREEN), (False, OTHERS)):
         places = found.places[found.reached == reached]
@@ -49,4 +52,24 @@ def test_places_are_green_where_the_path_is_in_reach(problem, name, way):
 def test_what_is_no_place_of_the_path_has_no_floor(problem):
     handles = handles_of(tomllib.loads(CIRCLE), problem)
     for name in ("post", "tool"):
-        assert floor_of([problem], [problem.robot.home[None]], handles[name]) is None
+        assert not Floor.can_move([problem], handles[name])
+
+
+def test_of_several_paths_all_have_to_be_in_reach(problem):
+    """And where one is so far away that it never is, nothing is green."""
+    handle = handles_of(tomllib.loads(CIRCLE), problem)["path"]
+    home = problem.robot.home[None]
+
+    def green(*problems):
+        found = Floor(problems, [home] * len(problems), handle)
+        while not found.is_done:
+            found.look()
+        return found.reached
+
+    up = SE3(np.eye(3), np.array([0.0, 0.0, 0.25]))
+    far = SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))
+    lifted = problem.changed(path=sm.paths.Placed(problem.path, up))
+    away = problem.changed(path=sm.paths.Placed(problem.path, far))
+    # Both have the same middle over the ground, and so the same places.
+    np.testing.assert_array_equal(green(problem, lifted), green(problem) & green(lifted))
+    assert not green(away, problem).any()

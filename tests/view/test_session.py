@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import FileFormatError, PlanError, ProblemError
+from selfmotion.basics import FileFormatError, PlanError, ProblemError, RobotError
+from selfmotion.model.task import SE3
 from selfmotion.shell.view import Session
 from selfmotion.shell.view.found import Found, NewerRequest, Request
+from selfmotion.shell.view.motions import standing
 from selfmotion.shell.view.planning import Planning
 from support.views import CIRCLE, Heard, moved, opened
 
@@ -235,6 +237,17 @@ def test_a_problem_without_a_motion_has_a_page_to_change_it_on(tmp_path):
         assert page.messages[-1]["kind"] == "none"
         page.drag("path", moved(x=-3.0))
         assert last(page).certificate.verified
+
+
+def test_an_arm_without_a_home_stands_in_the_middle_of_its_limits():
+    """Where it has no motion to show; nobody knows where else such an arm is."""
+    arm = sm.load_robot("planar_3r")
+    with pytest.raises(RobotError):
+        _ = arm.home
+    path = sm.paths.Line(SE3.Identity(), SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), 1.0)
+    found = standing(sm.Problem(arm, path, "planar"), None, "nowhere")
+    assert not found.certificate.verified
+    np.testing.assert_allclose(found.trajectory.q, 0.5 * np.tile(arm.lower + arm.upper, (2, 1)))
 
 
 def test_a_fault_of_the_program_ends_no_session(monkeypatch, tmp_path, capsys):

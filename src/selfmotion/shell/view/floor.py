@@ -1,7 +1,6 @@
 """Where else a part or an arm could stand while it is dragged: a coarse look, without bodies."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,13 +18,26 @@ _APART, _FAR = 1.0 / 8.0, 8
 _POSES, _FEWEST = 12, 3
 # Seeds of a pose that is not reached from the motion as it is.
 _SEEDS = 12
+# Places that are looked at while nothing newer is asked for.
+_AT_ONCE = 24
 # What moves paths and the arm apart when it is dragged.
 _DRAGGED = ("part", "path", "base")
 
 
-@dataclass(frozen=True, eq=False)
 class Floor:
     """Places of what is dragged, and whether all of the path is in reach there.
+
+    They are looked at some at a time, the nearest ones first. The places stay where they are while
+    it is moved to and fro.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        Their paths move together.
+    near : sequence of (K, n)
+        Configurations near their paths, spread along them.
+    handle : Handle
+        What is dragged, where it is by now; see `can_move`.
 
     Attributes
     ----------
@@ -35,57 +47,65 @@ class Floor:
         Whether single poses of all paths are within the joints' limits; bodies are not looked at.
     size : float
         How far apart places are [m].
+    looked : int
+        At how many of them was looked; the others count as not reached.
     """
 
-    places: Array
-    reached: Flags
-    size: float
+    def __init__(self, problems: Sequence[Problem], near: Sequence[Array], handle: Handle) -> None:
+        self._problems, self._near = tuple(problems), tuple(near)
+        robot, self.looked = problems[0].robot, 0
+        # From the arm to the middle of the paths; all that is farther than it reaches is left out.
+        middles = [
+            problem.follows.items[0].chain.base_placement.act(_middle(problem))
+            for problem in problems
+        ]
+        middle = np.mean(middles, axis=0)[:2]
+        arm = robot.joint_poses(self._near[0][:1, : robot.dof])[0, 0, :2]
+        self.size = _APART * robot.reach
+        steps = self.size * np.arange(-_FAR, _FAR + 1)
+        by = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        moved = by[np.linalg.norm(by, axis=1) <= robot.reach] + arm - middle
+        self._moved = moved[np.argsort(np.linalg.norm(moved, axis=1), kind="stable")]
+        # The path is as far from an arm that is moved as the other way round.
+        way = -1.0 if handle.kind == "base" else 1.0
+        self.places = (handle.prefix * handle.pose).translation[:2] + way * self._moved
+        self.reached = np.zeros(len(self.places), dtype=bool)
+
+    @staticmethod
+    def can_move(problems: Sequence[Problem], handle: Handle) -> bool:
+        """Whether a handle moves paths away from the arm, or the arm from these."""
+        return (
+            handle.kind in _DRAGGED
+            and handle.joint < 0
+            and all(
+                len(problem.follows.items) == 1
+                and problem.follows.items[0].chain.carrier < 0
+                and is_plain(problem.follows)
+                for problem in problems
+            )
+        )
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all places were looked at."""
+        return self.looked >= len(self.places)
+
+    def look(self) -> None:
+        """Look at some more places."""
+        here = slice(self.looked, self.looked + _AT_ONCE)
+        self.looked += _AT_ONCE
+        moved = self._moved[here]
+        reached = np.ones(len(moved), dtype=bool)
+        count = max(_POSES // len(self._problems), _FEWEST)
+        for problem, motion in zip(self._problems, self._near, strict=True):
+            if not reached.any():
+                break
+            reached[reached] = _reached(problem, motion, moved[reached], count)
+        self.reached[here] = reached
 
     def json(self, payload: Payload) -> Json:
         """Return what the page draws: the places in reach."""
         return {"places": payload.array(self.places[self.reached]), "size": self.size}
-
-
-def floor_of(problems: Sequence[Problem], near: Sequence[Array], handle: Handle) -> Floor | None:
-    """Return the places of a handle; None where dragging it moves nothing, or a path is carried.
-
-    The places stay where they are while it is moved to and fro.
-
-    Parameters
-    ----------
-    problems : sequence of Problem
-        Their paths move together.
-    near : sequence of (K, n)
-        Configurations near their paths, spread along them.
-    handle : Handle
-        What is dragged, where it is by now.
-    """
-    robot, chains = problems[0].robot, [problem.follows.items[0].chain for problem in problems]
-    is_moved = handle.kind in _DRAGGED and handle.joint < 0
-    if not is_moved or any(chain.carrier >= 0 for chain in chains):
-        return None
-    if not all(is_plain(problem.follows) for problem in problems):
-        return None
-    # From the arm to the middle of the paths; all that is farther than the arm reaches is left out.
-    middles = [
-        chain.base_placement.act(_middle(problem))
-        for chain, problem in zip(chains, problems, strict=True)
-    ]
-    middle = np.mean(middles, axis=0)[:2]
-    arm = robot.joint_poses(robot.home[None])[0, 0, :2]
-    size = _APART * robot.reach
-    steps = size * np.arange(-_FAR, _FAR + 1)
-    by = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    by = by[np.linalg.norm(by, axis=1) <= robot.reach]
-    # The path is as far from an arm that is moved as the other way round.
-    way = -1.0 if handle.kind == "base" else 1.0
-    moved = by + arm - middle
-    reached = np.ones(len(by), dtype=bool)
-    count = max(_POSES // len(problems), _FEWEST)
-    for problem, motion in zip(problems, near, strict=True):
-        reached[reached] = _reached(problem, motion, moved[reached], count)
-    at = (handle.prefix * handle.pose).translation[:2]
-    return Floor(at + way * moved, reached, size)
 
 
 def _middle(problem: Problem) -> Array:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, Flags, RobotError
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Plan
@@ -53,12 +53,22 @@ def standing(problem: Problem, last: Plan | None, words: str) -> Plan:
     It stands where the motion before began, else where the problem does; its certificate says why.
     """
     robot = problem.robot
-    q = robot.home
     if problem.given_start is not None:
         q = problem.given_start
     elif last is not None and last.robot.joint_names == robot.joint_names:
         q = last.trajectory.q[0]
+    else:
+        q = _somewhere(robot)
     return unproved(problem, _still(robot, q, problem.path.duration), words)
+
+
+def _somewhere(robot: RobotModel) -> Array:
+    """Return the home of an arm, or of one without a known home the middle of its limits."""
+    try:
+        return robot.home
+    except RobotError:
+        middle = 0.5 * (robot.lower + robot.upper)
+        return np.where(np.isfinite(middle), middle, 0.0)
 
 
 def _still(robot: RobotModel, q: Array, seconds: float) -> Trajectory:
@@ -88,9 +98,10 @@ def coarse_program(job: SeamJob, before: Program) -> Whole:
 def standing_program(job: SeamJob, last: Program | None, words: str) -> Whole:
     """Return an arm that stands, for a job of which no seam has a motion."""
     robot, problem = job.robot, job.problems[0]
-    q = robot.home
+    known = list[Array]()
     if last is not None and last.robot.joint_names == robot.joint_names:
-        q = next((step.motion.q[0] for step in last.steps if not step.is_missing), q)
+        known = [step.motion.q[0] for step in last.steps if not step.is_missing]
+    q = known[0] if known else _somewhere(robot)
     motion = _still(robot, q, _GAP)
     return _unproved(problem, motion, (Mark(0.0, _GAP, "no motion", False),), words)
 

@@ -20,7 +20,7 @@ from selfmotion.planning.result import Plan, retime
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
 from selfmotion.shell.view.document import is_job
-from selfmotion.shell.view.floor import Floor, floor_of
+from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.found import Found, NewerRequest, Request
 from selfmotion.shell.view.handles import handles_of
 from selfmotion.shell.view.maps import maps_soon
@@ -240,14 +240,16 @@ class Planning:
         key = (number, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
         known, floor = self._places
         if known != key:
-            yield found
-            if known is not None and known[0] == number:
-                # There was one in this drag: others wait until the hand does.
-                self._leave(request)
-            floor = floor_of(problems, near, handle)
+            floor = Floor(problems, near, handle) if Floor.can_move(problems, handle) else None
             self._places = key, floor
         self._floor = {request.number: floor}
         yield found
+        # Some at least, so that they are all there in the end of a drag without a rest.
+        while floor is not None and not floor.is_done:
+            floor.look()
+            self._leave(request)
+            if floor.is_done:
+                yield found
 
     def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:
         """Return a verified program in the order before; None where there is none."""

@@ -89,7 +89,7 @@ class Sitting:
         found = self._found
         if found is None or found.whole is None:
             return _OF_PLANS
-        if found.made is None:
+        if found.made is None and not self.saves:
             # A motion of a controller's own program is there already.
             return {}
         return _OF_PARTS if isinstance(found.made, Parts) else _OF_PROGRAMS

@@ -141,14 +141,16 @@ class _Drawing:
         """Yield lines of equal cost, each with how much dearer it is."""
         costs = self._places.costs
         least = float(np.nanmin(costs, initial=np.inf))
-        for more in _CONTOURS if np.isfinite(least) and least > 0.0 else ():
+        known = _CONTOURS if np.isfinite(least) and least > 0.0 else ()
+        for number, more in enumerate(known, 1):
             level = (1.0 + more) * least
             lines = list(_crossings(costs, level))
             if not lines:
                 continue
             way = "".join(f"M{self._at(*one)}L{self._at(*other)}" for one, other in lines)
             yield f'<path d="{way}" fill="none" stroke="#222" stroke-width="1.2"/>'
-            (i, j), _ = lines[len(lines) // 2]
+            # Each elsewhere along its line, so that no number is over another one.
+            (i, j), _ = lines[number * len(lines) // (len(known) + 1)]
             x, y = map(float, self._at(i, j).split(","))
             # White below, so that it can be read on its line.
             halo = ' stroke="#fff" stroke-width="3" paint-order="stroke"'
