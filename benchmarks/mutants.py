@@ -173,6 +173,7 @@ PARTS = (
         (
             "certificate/test_made_to_deceive.py",
             "certificate -k 'not default and not deception'",
+            "constraints/test_position_dependent.py",
             "constraints/test_limits.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
         ),

@@ -13,7 +13,7 @@ from selfmotion.certificate import check
 from selfmotion.certificate.check import _damped_intervals, _damping_cause, _undecided, _violations
 from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
 from selfmotion.model.task import DampingLaw
-from support.arms import PANDA_HOME, Case, robot_named
+from support.arms import PANDA_HOME, Case, robot_named, short_line
 from support.motions import motion_of
 
 
@@ -295,3 +295,24 @@ def test_what_no_slower_motion_mends_is_told_first() -> None:
     fast = dataclasses.replace(fast, of_pace=True, factor=1.5)
     assert list(_violations((fast, near))) == ["clearance", "speeds"]
     assert list(_violations((dataclasses.replace(near, satisfied=True), fast))) == ["speeds"]
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+def test_what_lasts_longer_than_its_path_is_judged_by_what_the_tool_does_in_it(
+    panda: sm.RobotModel, speed: float
+) -> None:
+    """By no more than a tick of a controller's clock, and only where the tool stays there."""
+    plan = sm.plan(sm.Problem(panda, short_line(panda, PANDA_HOME), start=PANDA_HOME)).require()
+    motion, more = plan.trajectory, 0.5 * check._CLOCK
+    rates = np.zeros((1, 7))
+    rates[0, 3] = speed
+    longer = dataclasses.replace(
+        motion,
+        t=np.append(motion.t, motion.t[-1] + more),
+        q=np.vstack([motion.q, motion.q[-1:] + more * rates]),
+        qd=np.vstack([motion.qd, rates]),
+        qdd=None if motion.qdd is None else np.vstack([motion.qdd, np.zeros((1, 7))]),
+    )
+    found = plan.problem.certify(longer, plan.tolerance)
+    assert ("too long" in found.verdict) is (speed > 0.0)
+    assert found.verified is (speed == 0.0)
