@@ -213,3 +213,22 @@ def test_other_elements_name_joints_too() -> None:
     more = f'<ros2_control name="arm"><joint name="{name}"/></ros2_control></robot>'
     found = sm.load_robot(robot.urdf.text.replace("</robot>", more), tool=robot.tool)
     np.testing.assert_array_equal(found.position_based_limits, robot.position_based_limits)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        *({"deceleration": value} for value in (0.0, -1.0, np.nan, np.inf)),
+        *({"offset": value} for value in (-0.1, np.nan, np.inf)),
+        *({"lower": value} for value in (2.0, 3.0, np.nan)),
+    ],
+)
+def test_curves_that_are_none_are_refused(broken: dict[str, float]) -> None:
+    """One number of one joint is enough."""
+    sound = {"deceleration": 1.0, "offset": 0.1, "lower": -2.0, "upper": 2.0}
+    values = {name: np.array([value, value]) for name, value in sound.items()}
+    BrakingCurves(**values)
+    for name, value in broken.items():
+        values[name][1] = value
+    with pytest.raises(sm.errors.ProblemError, match="expected decelerations above 0"):
+        BrakingCurves(**values)
