@@ -23,7 +23,9 @@ from selfmotion.certificate.path_error import (
     rotation_vectors,
 )
 from selfmotion.model.follow import Follows
+from selfmotion.model.follow.follow import only_tip
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import path_errors
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 
@@ -31,7 +33,7 @@ ROUNDING = 1e-12
 
 
 def errors_of(path: sm.paths.Path, task: sm.Task, robot: sm.RobotModel, *given: Any) -> PathCheck:
-    return bound_errors(robot, Follows.of(robot, path, task).only, *given)
+    return bound_errors(robot, only_tip(Follows.of(robot, path, task)), *given)
 
 
 def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
@@ -202,7 +204,7 @@ def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
     path = sm.paths.Waypoints.from_poses([0.0, 1.0, 2.0], [pose, pose, beside])
     problem = sm.Problem(robot, path, start=q)
     still = sm.Trajectory([0.0, 0.5, 2.0], [q] * 3, np.zeros((3, 7)), robot.joint_names)
-    errors = Formulation.of(problem).errors_between(still)
+    errors = path_errors(Formulation.of(problem), still)
     middles = [path.pose(0.25), path.pose(1.25)]
     expected = [problem.task.miss(target, pose) for target in middles]
     np.testing.assert_allclose(errors, expected, atol=1e-9)
@@ -210,9 +212,7 @@ def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
     name = ("x", "y", "z", "rx", "ry", "rz")[row]
     band = sm.Relaxation(name, 2.0 * offset, axes="tool")
     relaxed = dataclasses.replace(problem, relaxations=[band])
-    np.testing.assert_allclose(
-        Formulation.of(relaxed).errors_between(still), 0.0, atol=1e-5 * offset
-    )
+    np.testing.assert_allclose(path_errors(Formulation.of(relaxed), still), 0.0, atol=1e-5 * offset)
 
 
 # The deviation of a pose from its target, row by row.

@@ -13,6 +13,7 @@ from selfmotion.certificate import EndState, JointLimits
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.paper.objective import node_tangents
 from selfmotion.problem.constraints import NodeTangents, linearised
@@ -62,7 +63,7 @@ def objective_with(
     minimum_norm = MinimumNormMotion.on(formulation, start, grid)
     # At the start all ends have the same null space.
     at_rest = dataclasses.replace(formulation, follows=standing(robot, rows))
-    (bound,) = at_rest.bound(constraint.conditions(robot), start, start).every
+    (bound,) = bound_conditions(at_rest, constraint.conditions(robot), start, start).every
     return Objective.of(formulation, minimum_norm, free=True), bound
 
 

@@ -143,3 +143,20 @@ def test_files_with_a_clearance_among_the_constraints_are_read(
     job = sm.files.read_job(tmp_path / "former.json")
     assert any("give the table [clearance]" in note for note in job.notes)
     assert job.problem.digest == plan.problem.digest
+
+
+@pytest.mark.parametrize("form", ["toml", "json"])
+def test_several_clearances_are_written_and_read(
+    panda: sm.RobotModel, panda_circle: Circle, tmp_path: Path, form: str
+) -> None:
+    several = [sm.constraints.Clearance([ball_beside(panda)], 5e-3), NO_OVERLAP]
+    problem, file = panda_circle(clearance=several), tmp_path / f"cell.{form}"
+    sm.files.write_problem(problem, file)
+    assert sm.read_problem(file).digest == problem.digest
+    wrong = file.read_text().replace("radius", "radios")
+    file.write_text(wrong)
+    with pytest.raises(
+        sm.errors.FileFormatError,
+        match=r"clearance\[0\]\.obstacles\[0\]\.radios.*clearance\[0\]\.obstacles\[0\]\.radius: is",
+    ):
+        sm.read_problem(file)

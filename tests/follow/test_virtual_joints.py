@@ -10,13 +10,20 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.certificate.path_error import deviation_from
-from selfmotion.model.follow import Follows, RelaxedFrames
+from selfmotion.model.follow import Follows, with_tolerances
+from selfmotion.model.follow.relaxed import band_limits, deviation_of, has_windows, window_edges
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import (
     BoundConditions,
     CurveSamples,
     Formulation,
     SampledMotion,
+)
+from selfmotion.planning.formulation.formulation import (
+    on_path,
+    sampled,
+    sampled_along,
+    with_springs,
 )
 from selfmotion.planning.formulation.tolerances import RowWithinBand, WithinBand
 from selfmotion.planning.nodes import NodeGrid
@@ -64,7 +71,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
 ) -> None:
     robot, rng = robot_named(name), np.random.default_rng(1)
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), task)
-    follows = RelaxedFrames.with_tolerances(real, relaxations)
+    follows = with_tolerances(real, relaxations)
     virtual, n = follows.virtual, robot.dof
     lower, upper = robot.finite_limits()
     for _ in range(3):
@@ -99,14 +106,14 @@ def test_joints_stand_still_outside_of_windows() -> None:
     robot = robot_named("panda")
     path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
-    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, "pose"), windows)
+    follows = with_tolerances(Follows.of(robot, path, "pose"), windows)
     names = follows.coordinates.names[7:]
     held = follows.held(np.array([0.0, 1.0, 1.5, 2.0, 4.0]))[:, 7:]
     told = [{name for name, still in zip(names, row, strict=True) if still} for row in held]
     tilt = {"tilt rx", "tilt ry"}
     assert told == [tilt, tilt, set(), {"relaxed x"}, {"relaxed x"}]
-    assert follows.holds
-    assert follows.edges == (1.0, 2.0)
+    assert has_windows(follows)
+    assert window_edges(follows) == (1.0, 2.0)
 
 
 def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:
@@ -145,7 +152,7 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
     q = np.hstack([PANDA_HOME + 0.1 * rng.normal(size=(9, 7)), 0.3 * rng.normal(size=(9, more))])
     qd = rng.normal(size=q.shape)
     sampling = Sampling.trapezoidal(t)
-    whole = formulation.sampled_along(sampling, q, qd)
+    whole = sampled_along(formulation, sampling, q, qd)
     own = Samples.along(asked.follows, sampling, q[:, :7], qd[:, :7])
     for cost in formulation.costs:
         np.testing.assert_allclose(cost.value(whole.arm), cost.value(own), rtol=1e-12)
@@ -155,7 +162,7 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
             if part is not None:
                 np.testing.assert_allclose(part, wanted, rtol=1e-12)
     bound = formulation.conditions(q[0], q[-1], apart=False)
-    before = Formulation.on_path(asked).conditions(q[0, :7], q[-1, :7], apart=False)
+    before = on_path(asked).conditions(q[0, :7], q[-1, :7], apart=False)
     bands = [item for item in bound.inequalities if item.depends_on is DependsOn.TOLERANCES]
     # Of rows that share a band, each is within it by itself, too.
     assert [type(item) for item in bands] == [RowWithinBand, RowWithinBand, WithinBand]
@@ -172,7 +179,7 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
         def residual(x: Array, item=item, columns=columns) -> Array:
             there = q.copy()
             there[:, columns] = x
-            return item.residual(formulation.sampled_along(sampling, there, qd).seen_by(item))
+            return item.residual(sampled_along(formulation, sampling, there, qd).seen_by(item))
 
         if "velocity" not in item.name:
             exact = differences(residual, q[:, columns])
@@ -194,7 +201,7 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
     path = sm.paths.Dwell(robot.pose(start), 4.0)
     problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None)
     formulation = Formulation.of(problem)
-    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, task), relaxations)
+    follows = with_tolerances(Follows.of(robot, path, task), relaxations)
     virtual, n = follows.virtual, robot.dof
     sampling = Sampling.trapezoidal(np.linspace(0.0, 4.0, 5))
     said = 0
@@ -207,7 +214,7 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
             if virtual.swing is not None and k == virtual.swing[0]:
                 s[virtual.swing[1]] = off
             q = np.tile(np.append(start, s), (5, 1))
-            whole = formulation.sampled_along(sampling, q, np.zeros_like(q))
+            whole = sampled_along(formulation, sampling, q, np.zeros_like(q))
             for item in formulation.conditions(q[0], q[1], apart=False).every:
                 if not item.name.startswith("relaxation"):
                     continue
@@ -219,7 +226,7 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
                 if h.max() <= 0.0:
                     continue
                 rows = next(x for x in relaxations if x.name in item.name)
-                size = np.linalg.norm(follows.deviation(rows, q[:1]))
+                size = np.linalg.norm(deviation_of(follows, rows, q[:1]))
                 found = re.search(r"is (\S+) (rad|m) at", text)
                 assert found is not None
                 assert abs(float(found[1])) == pytest.approx(size, rel=1e-3)
@@ -255,7 +262,7 @@ def test_gradients_along_nodes_equal_central_differences(
     size = 1e-5
     here = centred(here)
     aims = [moved(here, side * direction).objective for side in (size, -size)]
-    slopes = here.grid.cost.slopes(here.samples, here.curve_ends, here.partials)
+    slopes = here.grid.cost.slopes(here.sampled.arm, here.curve_ends, here.partials)
     force = here.grid.spline.scattered(slopes)
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
@@ -269,7 +276,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     asked = sm.Problem(
         *(robot, circle), start=PANDA_HOME, relaxations=[R("z", 0.02)], rest=False, clearance=None
     )
-    soft = Formulation.of(asked).with_springs(3.0)
+    soft = with_springs(Formulation.of(asked), 3.0)
     assert soft.springs is not None
     t = np.linspace(0.0, 2.0, 7)
     grid = NodeGrid(soft, t, BoundConditions(), free=False, counts=Counts())
@@ -281,7 +288,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
         every = CurveSamples(
             soft.follows, spline.sampling, lambda o: spline.at(AT_GAUSS, o, ends).reshape(-1, 8)
         )
-        motion = soft.sampled(every)
+        motion = sampled(soft, every)
         return float(spline.sampling.weights @ (cost.integrand(motion) - hard(motion)))
 
     def hard(motion: SampledMotion) -> Array:
@@ -291,7 +298,9 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     edge = np.zeros((6, 6, 8))
     edge[:, [0, 3], 7] = soft.coordinates.upper[7]
     assert value(edge) == pytest.approx(3.0, rel=1e-9)
-    samples = soft.sampled(CurveSamples(soft.follows, spline.sampling, lambda o: np.zeros((30, 8))))
+    samples = sampled(
+        soft, CurveSamples(soft.follows, spline.sampling, lambda o: np.zeros((30, 8)))
+    )
     none = cost.partials(samples.arm)
     slopes = cost.slopes(samples.arm, ends, none)[:, :, 7:]
     direction = np.zeros_like(ends)
@@ -313,7 +322,7 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     """Of tolerances of several rows; what is within them may stay where it is."""
     robot = robot_named("panda")
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
-    follows = RelaxedFrames.with_tolerances(real, relaxations)
+    follows = with_tolerances(real, relaxations)
     count = len(follows.virtual.each)
     q = np.zeros((40, robot.dof + count))
     bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]
@@ -322,12 +331,12 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     if follows.virtual.swing is not None:
         first, second = follows.virtual.swing
         q[:, robot.dof + second] = q[:, robot.dof + first]
-    most = follows.within_bands(q)
+    most = band_limits(follows, q)
     there = np.clip(q, -most, most)
     for item in relaxations:
         if len(item.rows) == 1 or not np.isfinite(item.band):
             continue
-        sizes = [np.linalg.norm(follows.deviation(item, x), axis=1) for x in (q, there)]
+        sizes = [np.linalg.norm(deviation_of(follows, item, x), axis=1) for x in (q, there)]
         beyond = sizes[0] > item.band
         assert beyond.any()
         # They are brought to the edge, and no farther in.

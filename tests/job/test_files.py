@@ -151,7 +151,7 @@ def test_what_is_kept_is_given_up_only_where_no_program_comes_of_it(program, mon
 
     def to_no_kept_start(self, first, last, seconds, known=None):
         if last.tobytes() in begins:
-            return free_motion._missing(self, "not there")
+            return sm.Move(self.robot, self.constraints, None, "not there")
         return between(self, first, last, seconds, known)
 
     monkeypatch.setattr(FreeMotions, "between", to_no_kept_start)
@@ -178,7 +178,7 @@ def test_where_no_program_comes_of_it_all_is_planned_anew(program, monkeypatch) 
 
     def between(self, first, last, seconds, known=None):
         if known is not None:
-            return free_motion._missing(self, "not this way")
+            return sm.Move(self.robot, self.constraints, None, "not this way")
         return found(self, first, last, seconds)
 
     monkeypatch.setattr(FreeMotions, "between", between)
@@ -205,7 +205,9 @@ def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch)
     # Nothing else is tried than what is known.
     monkeypatch.setattr(work, "branches", lambda *_: ([], "nothing else is tried"))
     monkeypatch.setattr(
-        FreeMotions, "through", lambda self, *_: free_motion._missing(self, "nothing else")
+        FreeMotions,
+        "through",
+        lambda self, *_: sm.Move(self.robot, self.constraints, None, "nothing else"),
     )
     with pytest.raises(sm.errors.PlanError, match="nothing else is tried"):
         planned(clear_of(high), warm_start=before)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.model.follow.follow import null_basis_at
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.nodes import Step, minimise
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.optimise import Status
@@ -105,7 +107,7 @@ def test_a_given_end_is_reached_on_nodes(panda: sm.RobotModel) -> None:
     """The end of the open motion turned along its self-motion."""
     problem = circle(panda, rest=True)
     end = sm.plan(problem).trajectory.q[-1]
-    turned = end + 0.2 * problem.follows.null_basis(end)[:, 0]
+    turned = end + 0.2 * null_basis_at(problem.follows, end)[:, 0]
     pose = problem.path.pose(problem.path.duration)
     last = panda.inverse_kinematics(pose, "pose", seed=turned)
     assert np.abs(last - end).max() > 0.05
@@ -123,7 +125,7 @@ def test_a_given_acceleration_at_an_end_is_met_on_nodes(
     problem = circle(panda)
     free = sm.plan(problem).trajectory
     end = 0 if at_start else -1
-    null = problem.follows.null_basis(free.q[end])[:, 0]
+    null = null_basis_at(problem.follows, free.q[end])[:, 0]
     wanted = free.qdd[end] + 0.4 * null
     kind = sm.constraints.StartAcceleration if at_start else sm.constraints.EndAcceleration
     rates = (
@@ -193,7 +195,7 @@ def test_another_configuration_on_the_same_plane_is_none(planar: sm.RobotModel) 
     dwell = sm.paths.Dwell(planar.pose(start), 3.0)
     problem = sm.Problem(planar, dwell, "planar", start)
     asked = sm.constraints.EndConfiguration(curve[0]).conditions(problem.robot)
-    (end,) = Formulation.of(problem).bound(asked, start, start).ends
+    (end,) = bound_conditions(Formulation.of(problem), asked, start, start).ends
     away = (curve - curve[0]) @ end.null[:, 0]
     (others,) = np.nonzero(np.diff(np.sign(away[100:-100])))
     assert len(others)
@@ -228,7 +230,7 @@ def test_an_end_at_another_configuration_is_told(panda: sm.RobotModel) -> None:
     problem = circle(panda)
     end = np.array(PANDA_HOME)
     own = sm.constraints.EndConfiguration(end).conditions(problem.robot)
-    (asked,) = Formulation.of(problem).bound(own, end, end).ends
+    (asked,) = bound_conditions(Formulation.of(problem), own, end, end).ends
     away = 0.3 * problem.follows.jacobian(end)[0] / np.linalg.norm(problem.follows.jacobian(end)[0])
     nodes = np.tile(end, (4, 3, 1))
     assert NodeEnds([asked]).elsewhere(nodes) == {}

@@ -7,6 +7,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation
+from selfmotion.planning.formulation.formulation import path_errors
 from selfmotion.planning.nodes import NodeGrid
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import broken_intervals, forget, moved_along, stepped
@@ -57,7 +58,7 @@ def test_beside_a_singular_pose_rounding_of_the_path_does_not_accelerate_the_arm
     motion = grid.near(q, np.gradient(q, t, axis=0))
     assert motion is not None
     assert np.abs(motion.trajectory.qdd).max() < CALM
-    assert formulation.errors_between(motion.trajectory).max() < 1e-6
+    assert path_errors(formulation, motion.trajectory).max() < 1e-6
 
 
 def in_span(vectors: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -91,7 +92,7 @@ def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray,
     found = moved_along(motion, step, changes), stepped(motion, step)
     assert found[0] is not None
     assert found[1] is not None
-    assert grid.formulation.errors_between(found[0].trajectory).max() < ON_PATH
+    assert path_errors(grid.formulation, found[0].trajectory).max() < ON_PATH
     return jerks(place.nodes + moved), *(jerks(one.place.nodes) for one in found)
 
 

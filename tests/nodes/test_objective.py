@@ -6,6 +6,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.model.robot import has_masses
+from selfmotion.planning.formulation.formulation import with_springs
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective
 from selfmotion.planning.nodes.motion import on_grid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
@@ -158,7 +159,7 @@ def test_springs_of_tolerances_are_part_of_the_cost_and_its_derivatives(
     without = moved(nodes_of(problem), 0.03 * np.ones((13, 9)))
     grid = without.grid
     stiff = NodeGrid(
-        grid.formulation.with_springs(3.0), grid.t, grid.conditions, free=False, counts=Counts()
+        with_springs(grid.formulation, 3.0), grid.t, grid.conditions, free=False, counts=Counts()
     )
     motion = on_grid(centred(without), stiff)
     assert motion is not None

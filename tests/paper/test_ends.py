@@ -10,6 +10,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import (
     Eliminated,
@@ -62,7 +63,7 @@ def solved(
     formulation = Formulation.of(problem)
     minimum_norm, _ = converged_minimum_norm(formulation, np.array(problem.given_start))
     own = sm.constraints.Conditions.joined(item.conditions(problem.robot) for item in asked)
-    ends = formulation.bound(own, minimum_norm.start, minimum_norm.end).ends
+    ends = bound_conditions(formulation, own, minimum_norm.start, minimum_norm.end).ends
     return solve(formulation, minimum_norm, ends=ends, free=free, **options)
 
 

@@ -11,6 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
 from selfmotion.planning.paper import MinimumNormMotion, Solution, converged_minimum_norm, solve
 from selfmotion.problem.constraints import BoundEnd
@@ -50,7 +51,9 @@ def ends_of(
 ) -> tuple[BoundEnd, ...]:
     robot = minimum_norm.formulation.robot
     own = sm.constraints.Conditions.joined(item.conditions(robot) for item in asked)
-    return minimum_norm.formulation.bound(own, minimum_norm.start, minimum_norm.end).ends
+    return bound_conditions(
+        minimum_norm.formulation, own, minimum_norm.start, minimum_norm.end
+    ).ends
 
 
 @pytest.mark.parametrize(
@@ -66,7 +69,7 @@ def test_the_sample_problem_costs_what_an_independent_integration_says(
 ) -> None:
     found = solved(sm.sample_problem(null_motion=null_motion))
     assert found.status is Status.CONVERGED
-    assert found.null_motion == null_motion
+    assert found.method.formulation.problem.null_motion == null_motion
     assert found.coefficients.shape == (size,)
     assert found.cost == pytest.approx(cost, rel=AGREEMENT)
     minimum_norm = found.minimum_norm_evaluation

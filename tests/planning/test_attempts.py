@@ -12,6 +12,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import BreakdownError, Counts
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import keeps_off_itself
 from selfmotion.planning.planner import planner, verdicts
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes
@@ -143,7 +144,7 @@ def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.Rob
         panda, sm.paths.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start
     )
     careless = sm.plan(dataclasses.replace(problem, clearance=None))
-    assert not Formulation.of(problem).keeps_off_itself(careless.trajectory.q)
+    assert not keeps_off_itself(Formulation.of(problem), careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
     assert names_of(plan) == ["given start", "finer grids and proof"]

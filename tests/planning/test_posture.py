@@ -6,6 +6,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
 from selfmotion.model.follow import Coordinates
+from selfmotion.model.follow.relaxed import within_limits
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.rough import far_from_usual, wound_back
@@ -72,7 +73,7 @@ def test_whole_turns_are_told_by_the_limits_that_are_asked_for() -> None:
     problem = Formulation.of(cell.changed(constraints=(limits, *cell.constraints[1:])))
     t, envelope = np.linspace(0.0, problem.path.duration, 49), problem.envelope
     task = Stacked(problem.follows, envelope.quantities, lower, upper, np.ones(8))
-    arm = problem.follows.within(envelope.lower, envelope.upper)
+    arm = within_limits(problem.follows, envelope.lower, envelope.upper)
     starts, kept = task.placed(
         np.array(start_candidates(arm, 24, np.random.default_rng(0))), float(t[0])
     )

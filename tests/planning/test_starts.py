@@ -9,6 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation.formulation import keeps_off_itself
 from selfmotion.planning.planner.solution import Solution
 from support.arms import robot_named
 
@@ -86,7 +87,7 @@ def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() ->
     ur5 = robot_named("ur5")
     problem = sm.Problem(ur5, sm.paths.Circle(start, center, normal, 4.0), "pointing")
     careless = sm.plan(dataclasses.replace(problem, clearance=None))
-    assert not Formulation.of(problem).keeps_off_itself(careless.trajectory.q)
+    assert not keeps_off_itself(Formulation.of(problem), careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
     assert plan.report.cost > careless.report.cost

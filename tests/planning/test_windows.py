@@ -9,7 +9,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.follow import RelaxedFrames
+from selfmotion.model.follow import with_tolerances
+from selfmotion.model.follow.relaxed import completed
 from selfmotion.planning.formulation import Formulation
 
 # Two optima of one problem, found from different nodes, differ by so much of their cost.
@@ -80,7 +81,7 @@ def test_the_widest_band_says_what_a_pose_may_be() -> None:
     cones = [R(("rx", "ry"), 0.02, EARLY), R(("rx", "ry"), 0.2, LATE)]
     slides = [R(("x", "y"), 3e-3, EARLY), R(("y", "z"), 4e-3, LATE)]
     problem = sm.Problem(robot, sm.paths.Dwell(pose, 4.0), relaxations=[*cones, *slides])
-    virtual = RelaxedFrames.with_tolerances(problem.follows, problem.relaxations).virtual
+    virtual = with_tolerances(problem.follows, problem.relaxations).virtual
     wanted = {(3, 4): 0.2, (0, 1): 4e-3, (1, 2): 4e-3, (0,): 3e-3, (1,): 4e-3, (0, 2): 4e-3}
     found = {rows: virtual.widest(rows) for rows in wanted}
     assert found == pytest.approx(wanted)
@@ -88,7 +89,7 @@ def test_the_widest_band_says_what_a_pose_may_be() -> None:
     formulation = Formulation.of(problem)
     admits = formulation.envelope.admits
     tilted = [robot.inverse_kinematics(pose * tilt(angle)) for angle in (0.1, 0.199, 0.21)]
-    q = formulation.completed(np.full(3, 3.0), np.array(tilted))
+    q = completed(formulation.follows, np.full(3, 3.0), np.array(tilted))
     assert admits(q).tolist() == [True, True, False]
 
 

@@ -5,6 +5,8 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.model.follow.follow import only_tip
+from selfmotion.model.follow.relaxed import completed
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times
@@ -50,7 +52,7 @@ def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     assert np.flatnonzero(moved).tolist() == [16]
     assert t[16] < where[16] < t[17]
     for time, here in zip(where, q, strict=True):
-        assert problem.follows.only.miss(problem.path.pose(float(time)), here)[0] < 1e-9
+        assert only_tip(problem.follows).miss(problem.path.pose(float(time)), here)[0] < 1e-9
 
 
 def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotModel) -> None:
@@ -68,7 +70,9 @@ def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotM
     )
     formulation = Formulation.of(problem)
     t = np.linspace(0.0, 4.0, 9)
-    motions, arrived = carried(formulation.follows, formulation.completed(t[:1], start[None]), t)
+    motions, arrived = carried(
+        formulation.follows, completed(formulation.follows, t[:1], start[None]), t
+    )
     assert arrived.all()
     found = shortest_along(formulation, t, motions[0], t, (1.0, 0.3))
     assert found is not None

@@ -9,6 +9,7 @@ from scipy.interpolate import make_interp_spline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.search import single_poses
 from selfmotion.planning.search.curves import SPACING
 from selfmotion.planning.search.obstruction import (
     Obstruction,
@@ -152,9 +153,8 @@ def test_self_motions_of_a_pose_in_a_window_make_use_of_it() -> None:
     pose = robot.pose(robot.dexterous_configuration("pose"))
     window = sm.Relaxation("rz", during=(1.0, 3.0))
     problem = sm.Problem(robot, sm.paths.Dwell(pose, 4.0), "pose", relaxations=[window])
-    curves = SinglePoses(Formulation.of(problem), np.random.default_rng(0))._along_curves(
-        2.0, np.empty((0, 7))
-    )
+    poses = SinglePoses(Formulation.of(problem), np.random.default_rng(0))
+    curves = single_poses._along_curves(poses, 2.0, np.empty((0, 7)))
     tools = [robot.pose(q[: robot.dof]) for q in curves]
     away = [np.linalg.norm(tool.translation - pose.translation) for tool in tools]
     tilts = [np.linalg.norm(tool.rotation[:, 2] - pose.rotation[:, 2]) for tool in tools]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.model.follow.relaxed import within_limits
 from selfmotion.planning.search import carried, start_candidates
 from support.arms import Case
 from support.two_arms import both_arms
@@ -53,7 +54,7 @@ def test_within_narrow_limits_there_are_some_as_well(number: int) -> None:
     rng = np.random.default_rng(number)
     below, above = rng.uniform(0.0, 0.5, (2, len(start)))
     lower, upper = start - below, start + above
-    starts = start_candidates(follows.within(lower, upper), 8, np.random.default_rng(0))
+    starts = start_candidates(within_limits(follows, lower, upper), 8, np.random.default_rng(0))
     assert starts
     for q in starts:
         assert ((q >= lower) & (q <= upper)).all()

@@ -4,6 +4,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
+from selfmotion.model.follow.relaxed import completed
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
@@ -41,7 +42,7 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
 
 
 def _all_of(formulation: Formulation, q: Array) -> Array:
-    return np.asarray(formulation.completed(np.zeros(1), q[None])[0])
+    return np.asarray(completed(formulation.follows, np.zeros(1), q[None])[0])
 
 
 def moved(motion: NodeMotion, step: Array) -> NodeMotion:

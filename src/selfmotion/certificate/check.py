@@ -101,9 +101,7 @@ def certify(
     _check_arguments(robot, path, trajectory, ending)
     as_called(progress, "progress")
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
-    follows = Follows.of(robot, path, task, as_several(also, "also", Follow))
-    for item in follows.items:
-        check_oriented(item.path, item.task)
+    follows = _oriented(Follows.of(robot, path, task, as_several(also, "also", Follow)))
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
     checks = [
@@ -121,9 +119,9 @@ def certify(
     cut = _cut_short(ending, follows, trajectory, checks, tolerance)
     off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
     # A time that differs by digits is not worth a message where the tool is off its path.
-    by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
+    digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
     failures = (
-        *((off or cut) if by_digits else cut + off),
+        *((off or cut) if digits else cut + off),
         *(text for check in checks for text in _undecided(check)),
         *with_feeds(tuple(_violations(findings)), feeds, findings),
     )
@@ -145,6 +143,13 @@ def certify(
         motion=trajectory.digest,
         version=version(),
     )
+
+
+def _oriented(follows: Follows) -> Follows:
+    """Return task frames; PathError where orientations are prescribed that a path has not."""
+    for item in follows.items:
+        check_oriented(item.path, item.task)
+    return follows
 
 
 def _violations(findings: Sequence[Finding]) -> Iterator[str]:

@@ -1,10 +1,36 @@
 """Task frames on their paths: chains, paths, and the prescribed rows of all."""
 
-from selfmotion.model.follow.coordinates import Coordinates as Coordinates
+from selfmotion.model.follow.coordinates import (
+    Coordinates as Coordinates,
+    generic_values as generic_values,
+)
 from selfmotion.model.follow.follow import (
     BoundTaskFrame as BoundTaskFrame,
     Follow as Follow,
     Follows as Follows,
+    chain_tables as chain_tables,
+    every_column as every_column,
+    kinematics_of as kinematics_of,
+    linear_rows as linear_rows,
+    null_basis_at as null_basis_at,
+    only_tip as only_tip,
+    row_names_of as row_names_of,
 )
-from selfmotion.model.follow.relaxed import RelaxedFrames as RelaxedFrames
-from selfmotion.model.follow.virtual_joints import VirtualJoints as VirtualJoints
+from selfmotion.model.follow.relaxed import (
+    band_limits as band_limits,
+    completed as completed,
+    completed_along as completed_along,
+    deviation_of as deviation_of,
+    has_windows as has_windows,
+    is_plain as is_plain,
+    limits_within as limits_within,
+    tip_names as tip_names,
+    window_edges as window_edges,
+    windows_shut as windows_shut,
+    with_tolerances as with_tolerances,
+    within_limits as within_limits,
+)
+from selfmotion.model.follow.virtual_joints import (
+    VirtualJoints as VirtualJoints,
+    joint_of as joint_of,
+)

@@ -105,11 +105,6 @@ class Coordinates:
             np.where(np.isfinite(self.upper), self.upper, np.pi),
         )
 
-    def generic(self) -> Array:
-        """Return a few values within the limits, at none of which anything is special, (5, n)."""
-        lower, upper = self.finite_limits()
-        return np.random.default_rng(0).uniform(lower, upper, (5, self.dof))
-
     def usual(self) -> Array:
         """Return home (n,) where it is known, virtual joints at 0; else the middle of limits."""
         n = self.robot.dof
@@ -123,3 +118,9 @@ class Coordinates:
         """Return a dexterous configuration of the arm for a task, on the path itself, (n,)."""
         q = self.robot.dexterous_configuration(task)
         return np.concatenate([q, np.zeros(self.dof - len(q))])
+
+
+def generic_values(coordinates: Coordinates) -> Array:
+    """Return a few values within the limits, at none of which anything is special, (5, n)."""
+    lower, upper = coordinates.finite_limits()
+    return np.random.default_rng(0).uniform(lower, upper, (5, coordinates.dof))

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, shown
 from selfmotion.basics.layout import Layout, layout_of
-from selfmotion.model.follow.coordinates import Coordinates
+from selfmotion.model.follow.coordinates import Coordinates, generic_values
+from selfmotion.model.follow.virtual_joints import NO_VIRTUAL_JOINTS, VirtualJoints
 from selfmotion.model.path import Dwell, Path, PathSamples, twist_rates
 from selfmotion.model.robot import Chain, RobotModel, null_space
 from selfmotion.model.robot.tree_arrays import JOINT
@@ -195,10 +196,13 @@ class Follows:
         The arm.
     items : tuple of BoundTaskFrame
         Each a tip on its path; their rows are stacked in this order. They last equally long.
+    virtual : VirtualJoints
+        Those of tolerances of the first path, whose tip is then on it; mostly none.
     """
 
     robot: RobotModel
     items: tuple[BoundTaskFrame, ...]
+    virtual: VirtualJoints = NO_VIRTUAL_JOINTS
 
     @classmethod
     def of(
@@ -211,7 +215,7 @@ class Follows:
     @cached_property
     def coordinates(self) -> Coordinates:
         """Coordinates of motions."""
-        return Coordinates.of(self.robot)
+        return Coordinates.of(self.robot, self.virtual if self.virtual.each else None)
 
     @property
     def dof(self) -> int:
@@ -228,46 +232,11 @@ class Follows:
         """Duration of the motion [s]."""
         return self.items[0].path.duration
 
-    @property
-    def only(self) -> BoundTaskFrame:
-        """The one tip that is followed.
-
-        Raises
-        ------
-        ProblemError
-            There are several.
-        """
-        if len(self.items) > 1:
-            raise ProblemError(
-                f"{self.robot.name}: {len(self.items)} frames follow paths of their own, which is "
-                f"not supported here, only one"
-            )
-        return self.items[0]
-
-    @property
-    def path(self) -> Path:
-        """The path of the one tip."""
-        return self.only.path
-
-    @property
-    def task(self) -> Task:
-        """The rows of the one tip."""
-        return self.only.task
-
     @cached_property
     def redundancy(self) -> int:
         """Number n - m of directions of self-motion at generic configurations."""
-        jacobians = [self.jacobian(q) for q in self.coordinates.generic()]
+        jacobians = [self.jacobian(q) for q in generic_values(self.coordinates)]
         return self.dof - max(map(_rank, jacobians))
-
-    @cached_property
-    def linear(self) -> Array:
-        """1 for rows in metres, 0 for those in radians, (m,)."""
-        return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
-
-    def kinematics(self) -> TipKinematics:
-        """Return the kinematics of all tips with own data, for repeated calls."""
-        return TipKinematics([item.chain for item in self.items])
 
     def targets(self, t: Array) -> Array:
         """Return the prescribed poses of the tips at times t (W,), rotations as rows, (W, 12 F)."""
@@ -283,40 +252,6 @@ class Follows:
         return layout_of(
             [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.dof
         )
-
-    @cached_property
-    def chains(self) -> Array:
-        """Tables of the chains for compiled kernels, padded, (F, c + 1, 6, 3)."""
-        tables = [item.chain.table for item in self.items]
-        found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
-        for own, table in zip(found, tables, strict=True):
-            own[: len(table)] = table
-        return found
-
-    def every_column(self, q: Array) -> tuple[Array, Ints] | None:
-        """Return the columns of all joints at q (S, n), (S, F, 6, W), and their order (F + 1, W).
-
-        None where no joint on a chain mimics another one: then those of coordinates will do.
-        Derivatives of Jacobians need them, see `selfmotion.model.kernels.tool`.
-        """
-        if not any(item.chain.is_coupled for item in self.items):
-            return None
-        tables = [item.chain.table for item in self.items]
-        coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
-        ends = np.cumsum([0, *map(len, coordinates)])
-        columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))
-        orders = []
-        for f, item in enumerate(self.items):
-            own = slice(int(ends[f]), int(ends[f + 1]))
-            columns[:, f, :, own] = item.chain.every_along(q)
-            others = np.delete(np.arange(ends[-1]), own)
-            orders.append(np.append(np.arange(ends[-1])[own], others))
-        return columns, np.array([*orders, np.concatenate(coordinates)])
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Names of the rows, (m)."""
-        return tuple(name for item in self.items for name in item.task.row_names)
 
     def twists(self, t: Array) -> Array:
         """Return the prescribed rows of the paths' twists at times t (K,), (K, m) [m/s, rad/s]."""
@@ -334,57 +269,76 @@ class Follows:
             rows.append(item.task.select_along(jacobian, rotation))
         return np.concatenate(rows, axis=1)
 
-    def null_basis(self, q: Array) -> Array:
-        """Return an orthonormal basis of the self-motion's directions at q (n,), (n, r)."""
-        return null_space(self.jacobian(q))
-
-    def along(self, path: Path) -> Follows:
-        """Return that the one tip follows another path."""
-        return replace(self, items=(replace(self.only, path=path),))
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is the arm's own tool alone, of which the arm has inverse kinematics."""
-        return len(self.items) == 1
-
-    @property
-    def names(self) -> str:
-        """The tips that are followed, for messages."""
-        return " and ".join(f"'{item.chain.tip_name}'" for item in self.items)
-
     def held(self, t: Array) -> Flags:
         """Return the mask of coordinates that are held at 0 at times t (K,), (K, n)."""
-        return np.zeros((len(t), self.dof), dtype=np.bool_)
+        none = np.zeros((len(t), self.robot.dof), dtype=np.bool_)
+        return np.hstack([none, self.virtual.held(t)]) if self.virtual.each else none
 
-    def within_bands(self, q: Array) -> Array:
-        """Return limits of |q| like q (K, n), within which joints that share a band keep it.
 
-        Infinite where they do. Of bands in several windows the widest one counts.
-        """
-        return np.full_like(q, np.inf)
+def only_tip(follows: Follows) -> BoundTaskFrame:
+    """Return the one tip that is followed.
 
-    @property
-    def holds(self) -> bool:
-        """Whether there are such at any time."""
-        return False
+    Raises
+    ------
+    ProblemError
+        There are several.
+    """
+    if len(follows.items) > 1:
+        raise ProblemError(
+            f"{follows.robot.name}: {len(follows.items)} frames follow paths of their own, which "
+            f"is not supported here, only one"
+        )
+    return follows.items[0]
 
-    @property
-    def with_windows_shut(self) -> Follows:
-        """The same with those coordinates held at 0 at all times, for integrated motions."""
-        return self
 
-    @property
-    def edges(self) -> tuple[float, ...]:
-        """Times at which coordinates start or end to be held [s]."""
-        return ()
+def linear_rows(follows: Follows) -> Array:
+    """1 for rows in metres, 0 for those in radians, (m,)."""
+    return np.concatenate([item.task.rows < 3 for item in follows.items]).astype(np.float64)
 
-    def within(self, lower: Array, upper: Array) -> Follows:
-        """Return the same for an arm with other limits, (n,) each [rad or m]."""
-        return replace(self, robot=replace(self.robot, lower=lower, upper=upper))
 
-    def completed(self, t: Array, q: Array) -> Array:
-        """Return all coordinates (K, n) for the arm's own at times t (K,) [s] of the path."""
-        return q
+def kinematics_of(follows: Follows) -> TipKinematics:
+    """Return the kinematics of all tips with own data, for repeated calls."""
+    return TipKinematics([item.chain for item in follows.items])
+
+
+def chain_tables(follows: Follows) -> Array:
+    """Tables of the chains for compiled kernels, padded, (F, c + 1, 6, 3)."""
+    tables = [item.chain.table for item in follows.items]
+    found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
+    for own, table in zip(found, tables, strict=True):
+        own[: len(table)] = table
+    return found
+
+
+def every_column(follows: Follows, q: Array) -> tuple[Array, Ints] | None:
+    """Return the columns of all joints at q (S, n), (S, F, 6, W), and their order (F + 1, W).
+
+    None where no joint on a chain mimics another one: then those of coordinates will do.
+    Derivatives of Jacobians need them, see `selfmotion.model.kernels.tool`.
+    """
+    if not any(item.chain.is_coupled for item in follows.items):
+        return None
+    tables = [item.chain.table for item in follows.items]
+    coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
+    ends = np.cumsum([0, *map(len, coordinates)])
+    columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))
+    orders = []
+    for f, item in enumerate(follows.items):
+        own = slice(int(ends[f]), int(ends[f + 1]))
+        columns[:, f, :, own] = item.chain.every_along(q)
+        others = np.delete(np.arange(ends[-1]), own)
+        orders.append(np.append(np.arange(ends[-1])[own], others))
+    return columns, np.array([*orders, np.concatenate(coordinates)])
+
+
+def row_names_of(follows: Follows) -> tuple[str, ...]:
+    """Names of the rows, (m)."""
+    return tuple(name for item in follows.items for name in item.task.row_names)
+
+
+def null_basis_at(follows: Follows, q: Array) -> Array:
+    """Return an orthonormal basis of the self-motion's directions at q (n,), (n, r)."""
+    return null_space(follows.jacobian(q))
 
 
 def _rank(jacobian: Array) -> int:

@@ -2,15 +2,12 @@
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
-from typing_extensions import override
 
-from selfmotion.basics import Array, Flags
-from selfmotion.model.follow.coordinates import Coordinates
+from selfmotion.basics import Array
 from selfmotion.model.follow.follow import BoundTaskFrame, Follows
 from selfmotion.model.follow.table_chain import TableChain
 from selfmotion.model.follow.virtual_joints import VirtualJoints
@@ -22,138 +19,128 @@ from selfmotion.model.task import SE3, Relaxation, Task
 _INSIDE = 0.999
 
 
-@dataclass(frozen=True, eq=False)
-class RelaxedFrames(Follows):
-    """Task frames whose first one has tolerances: the tip of its virtual joints is on the path.
+def with_tolerances(follows: Follows, relaxations: Sequence[Relaxation]) -> Follows:
+    """Return the task frames of an arm with rows of its first path relaxed."""
+    arm, (first, *others) = follows.robot, follows.items
+    virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
+    n = arm.dof
+    dof = n + len(virtual.each)
 
-    Attributes
-    ----------
-    virtual : VirtualJoints
+    def bound(item: BoundTaskFrame, table: Array, task: Task) -> BoundTaskFrame:
+        return BoundTaskFrame(TableChain(item.chain.tip_name, table, dof), item.path, task)
+
+    items = [bound(first, virtual.table(first.chain, n), virtual.task)]
+    items += [bound(item, item.chain.table, item.task) for item in others]
+    alike = virtual.alike(n)
+    if alike is not None:
+        at_rest = Dwell(SE3.Identity(), follows.duration)
+        items.append(BoundTaskFrame(TableChain("", alike, dof), at_rest, cast(Task, _Alike())))
+    return Follows(arm, tuple(items), virtual)
+
+
+def is_plain(follows: Follows) -> bool:
+    """Whether it is the arm's own tool alone, of which the arm has inverse kinematics."""
+    return len(follows.items) == 1 and not follows.virtual.each
+
+
+def tip_names(follows: Follows) -> str:
+    """Return the tips that are followed, for messages."""
+    names = (item.chain.tip_name for item in follows.items)
+    return " and ".join(f"'{name}'" for name in names if name)
+
+
+def within_limits(follows: Follows, lower: Array, upper: Array) -> Follows:
+    """Return the same for coordinates with other limits, (n,) each [rad or m]."""
+    if not follows.virtual.each:
+        return replace(follows, robot=replace(follows.robot, lower=lower, upper=upper))
+    found = copy(follows)
+    found.__dict__["coordinates"] = follows.coordinates.within(lower, upper)
+    return found
+
+
+def completed(follows: Follows, t: Array, q: Array) -> Array:
+    """Return all coordinates (K, n) for the arm's own at times t (K,) [s] of the path."""
+    return completed_along(follows, follows.items[0].path, t, q)
+
+
+def completed_along(follows: Follows, path: Path, t: Array, q: Array) -> Array:
+    """Return q (K, n) with the virtual joints that lead to a path at its times t (K,)."""
+    if not follows.virtual.each:
+        return q
+    _, turns, places = follows.robot.chain.along(q)
+    wanted = path.samples(np.minimum(t, path.duration))
+    found = follows.virtual.coordinates((turns, places), (wanted.rotation, wanted.translation))
+    held = follows.virtual.held(t * (follows.duration / path.duration))
+    found[held] = 0.0
+    return np.hstack([q, found])
+
+
+def deviation_of(follows: Follows, item: Relaxation, q: Array) -> Array:
+    """Return the deviations of a relaxation's rows at q (K, n), (K, k) [m, rad]."""
+    return follows.virtual.rows_of(item, q[:, follows.robot.dof :])[0]
+
+
+def limits_within(follows: Follows, item: Relaxation, band: float = np.inf) -> Array:
+    """Return limits of |q| (n,) beyond which a relaxation's rows are off their path too far.
+
+    By more than a band, or by more than the relaxations let each of them be at any time.
     """
+    found, virtual = np.full(follows.dof, np.inf), follows.virtual
+    first = follows.robot.dof
+    for k, joint in enumerate(virtual.each):
+        if joint.row in item.indices:
+            # The first hinge of a tilt turns by half of it.
+            halved = virtual.swing is not None and k == virtual.swing[0]
+            share = 0.5 if halved else 1.0
+            most = min(band, virtual.widest([joint.row]))
+            found[first + k] = share * most / joint.scale
+    return found
 
-    virtual: VirtualJoints = field(kw_only=True)
 
-    @classmethod
-    def with_tolerances(
-        cls, follows: Follows, relaxations: Sequence[Relaxation]
-    ) -> "RelaxedFrames":
-        """Return the task frames of an arm with rows of its first path relaxed."""
-        arm, (first, *others) = follows.robot, follows.items
-        virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
-        n = arm.dof
-        dof = n + len(virtual.each)
+def band_limits(follows: Follows, q: Array) -> Array:
+    """Return limits of |q| like q (K, n), within which joints that share a band keep it.
 
-        def bound(item: BoundTaskFrame, table: Array, task: Task) -> BoundTaskFrame:
-            return BoundTaskFrame(TableChain(item.chain.tip_name, table, dof), item.path, task)
-
-        items = [bound(first, virtual.table(first.chain, n), virtual.task)]
-        items += [bound(item, item.chain.table, item.task) for item in others]
-        alike = virtual.alike(n)
-        if alike is not None:
-            at_rest = Dwell(SE3.Identity(), follows.duration)
-            items.append(BoundTaskFrame(TableChain("", alike, dof), at_rest, cast(Task, _Alike())))
-        return cls(arm, tuple(items), virtual=virtual)
-
-    @cached_property
-    @override
-    def coordinates(self) -> Coordinates:
-        return Coordinates.of(self.robot, self.virtual)
-
-    @override
-    def within(self, lower: Array, upper: Array) -> "RelaxedFrames":
-        found = copy(self)
-        found.__dict__["coordinates"] = self.coordinates.within(lower, upper)
-        return found
-
-    @override
-    def completed(self, t: Array, q: Array) -> Array:
-        return self.completed_along(self.items[0].path, t, q)
-
-    def completed_along(self, path: Path, t: Array, q: Array) -> Array:
-        """Return q (K, n) with the virtual joints that lead to a path at its times t (K,)."""
-        _, turns, places = self.robot.chain.along(q)
-        wanted = path.samples(np.minimum(t, path.duration))
-        found = self.virtual.coordinates((turns, places), (wanted.rotation, wanted.translation))
-        held = self.virtual.held(t * (self.duration / path.duration))
-        found[held] = 0.0
-        return np.hstack([q, found])
-
-    @property
-    @override
-    def with_windows_shut(self) -> "RelaxedFrames":
-        none = np.zeros(self.robot.dof, dtype=np.bool_)
-        held = np.append(none, self.virtual.windowed)
-
-        def shut(item: BoundTaskFrame) -> BoundTaskFrame:
-            own = item.chain
-            return BoundTaskFrame(
-                TableChain(own.tip_name, own.table, self.dof, held), item.path, item.task
-            )
-
-        return replace(self, items=tuple(shut(item) for item in self.items))
-
-    def deviation(self, item: Relaxation, q: Array) -> Array:
-        """Return the deviations of a relaxation's rows at q (K, n), (K, k) [m, rad]."""
-        return self.virtual.rows_of(item, q[:, self.robot.dof :])[0]
-
-    def limits_within(self, item: Relaxation, band: float = np.inf) -> Array:
-        """Return limits of |q| (n,) beyond which a relaxation's rows are off their path too far.
-
-        By more than a band, or by more than the relaxations let each of them be at any time.
-        """
-        found = np.full(self.dof, np.inf)
-        first = self.robot.dof
-        for k, joint in enumerate(self.virtual.each):
+    Infinite where they do. Of bands in several windows the widest one counts.
+    """
+    found, first, virtual = np.full_like(q, np.inf), follows.robot.dof, follows.virtual
+    for item in virtual.relaxations:
+        band = virtual.widest(item.indices)
+        if len(item.rows) == 1 or not np.isfinite(band):
+            continue
+        size = np.linalg.norm(deviation_of(follows, item, q), axis=1)
+        beyond = size > band
+        share = _INSIDE * band / np.where(beyond, size, 1.0)
+        for k, joint in enumerate(virtual.each, first):
             if joint.row in item.indices:
-                # The first hinge of a tilt turns by half of it.
-                halved = self.virtual.swing is not None and k == self.virtual.swing[0]
-                share = 0.5 if halved else 1.0
-                most = min(band, self.virtual.widest([joint.row]))
-                found[first + k] = share * most / joint.scale
-        return found
+                found[beyond, k] = share[beyond] * np.abs(q[beyond, k])
+    return found
 
-    @override
-    def within_bands(self, q: Array) -> Array:
-        found, first = np.full_like(q, np.inf), self.robot.dof
-        for item in self.virtual.relaxations:
-            band = self.virtual.widest(item.indices)
-            if len(item.rows) == 1 or not np.isfinite(band):
-                continue
-            size = np.linalg.norm(self.deviation(item, q), axis=1)
-            beyond = size > band
-            share = _INSIDE * band / np.where(beyond, size, 1.0)
-            for k, joint in enumerate(self.virtual.each, first):
-                if joint.row in item.indices:
-                    found[beyond, k] = share[beyond] * np.abs(q[beyond, k])
-        return found
 
-    @property
-    @override
-    def is_plain(self) -> bool:
-        return False
+def has_windows(follows: Follows) -> bool:
+    """Whether coordinates are held at 0 at any time."""
+    return bool(follows.virtual.each and follows.virtual.windowed.any())
 
-    @property
-    @override
-    def names(self) -> str:
-        return " and ".join(
-            f"'{item.chain.tip_name}'" for item in self.items if item.chain.tip_name
-        )
 
-    @override
-    def held(self, t: Array) -> Flags:
-        none = np.zeros((len(t), self.robot.dof), dtype=np.bool_)
-        return np.hstack([none, self.virtual.held(t)])
+def windows_shut(follows: Follows) -> Follows:
+    """Return the same with those coordinates held at 0 at all times, for integrated motions."""
+    if not has_windows(follows):
+        return follows
+    none = np.zeros(follows.robot.dof, dtype=np.bool_)
+    held = np.append(none, follows.virtual.windowed)
 
-    @property
-    @override
-    def holds(self) -> bool:
-        return bool(self.virtual.windowed.any())
+    def shut(item: BoundTaskFrame) -> BoundTaskFrame:
+        own = item.chain
+        chain = TableChain(own.tip_name, own.table, follows.dof, held)
+        return BoundTaskFrame(chain, item.path, item.task)
 
-    @property
-    @override
-    def edges(self) -> tuple[float, ...]:
-        ends = {x for item in self.virtual.relaxations for x in item.window(self.duration)}
-        return tuple(sorted(ends - {0.0, self.duration}))
+    return replace(follows, items=tuple(shut(item) for item in follows.items))
+
+
+def window_edges(follows: Follows) -> tuple[float, ...]:
+    """Return the times at which coordinates start or end to be held [s]."""
+    relaxations = follows.virtual.relaxations
+    ends = {x for item in relaxations for x in item.window(follows.duration)}
+    return tuple(sorted(ends - {0.0, follows.duration}))
 
 
 class _Alike:

@@ -92,9 +92,9 @@ class VirtualJoints:
         self.relaxations, self._duration, self._lever = tuple(relaxations), duration, lever
         in_tool = any(item.in_tool_axes for item in relaxations)
         rows = sorted({k for item in relaxations for k in item.indices})
-        slides = [self._slide(row) for row in rows if row < 3]
+        slides = [_slide(self, row) for row in rows if row < 3]
         self.under = () if in_tool else tuple(slides)
-        hinges, self.task = self._hinges(task, [row - 3 for row in rows if row >= 3], in_tool)
+        hinges, self.task = _hinges(self, task, [row - 3 for row in rows if row >= 3], in_tool)
         self.behind = (*hinges, *(slides if in_tool else ()))
 
     @property
@@ -117,100 +117,9 @@ class VirtualJoints:
         alike = [k for k, joint in enumerate(self.each) if joint.name.startswith("tilt")]
         return (alike[0], alike[2]) if len(alike) == 3 else None
 
-    def _bands(self, row: int) -> list[float]:
-        return [item.band for item in self.relaxations if row in item.indices]
-
-    def _scale(self, row: int) -> float:
-        return min(*self._bands(row), self._lever if row < 3 else 1.0)
-
-    def _slide(self, row: int) -> VirtualJoint:
-        scale = self._scale(row)
-        limit = max(self._bands(row)) / scale
-        return VirtualJoint(f"relaxed {ROW_NAMES[row]}", row, False, scale, row, limit, -1.0)
-
-    def _hinges(
-        self, task: Task, axes: list[int], in_tool: bool
-    ) -> tuple[list[VirtualJoint], Task]:
-        """Return the hinges, and the rows of the frame behind them that are on the path."""
-        if task is Task.POINTING:
-            together = {item.rows for item in self.relaxations if item.angular}
-            alone = bool(axes) and {frozenset(rows) for rows in together} != {frozenset(_TILT)}
-            across = [item for item in self.relaxations if item.in_tool_axes]
-            turned = any(set(item.rows) not in _ROUND for item in across)
-            if not (alone or turned):
-                return (self._tilt(*axes, alike=False) if axes else []), task
-            return [_heading(), *self._about(axes)], Task.POSE
-        if task is Task.POSITION and in_tool:
-            # The band is in its path's axes, from which the tool may be rotated by any angle.
-            free = [VirtualJoint(f"tilt {k}", k % 2, True, 1.0 if k % 2 else 0.5) for k in range(3)]
-            return [_heading(), *free], Task.POSE
-        return self._about(axes), task
-
-    def _about(self, axes: list[int]) -> list[VirtualJoint]:
-        """Return the hinges of rows of rotation about up to three axes."""
-        if len(axes) < 2:
-            return [self._hinge(axis) for axis in axes]
-        if len(axes) == 2:
-            return self._tilt(*axes, alike=True)
-        last = self._twisted()
-        first, second = (axis for axis in axes if axis != last)
-        return [self._hinge(last), *self._tilt(first, second, alike=True)]
-
-    def _hinge(self, axis: int) -> VirtualJoint:
-        row = 3 + axis
-        scale = self._scale(row)
-        limit = max(self._bands(row)) / scale
-        return VirtualJoint(f"relaxed {ROW_NAMES[row]}", axis, True, scale, row, limit)
-
-    def _tilt(self, i: int, j: int, *, alike: bool) -> list[VirtualJoint]:
-        """Return the joints that tilt about two axes, without a twist where two turn `alike`."""
-        scale = min(self._scale(3 + i), self._scale(3 + j))
-        limits = [max(self._bands(3 + axis)) / scale for axis in (i, j)]
-        if not alike:
-            return [
-                VirtualJoint(f"tilt {ROW_NAMES[3 + axis]}", axis, True, scale, 3 + axis, limit)
-                for axis, limit in zip((i, j), limits, strict=True)
-            ]
-        first = VirtualJoint(f"tilt {ROW_NAMES[3 + i]}", i, True, 0.5 * scale, 3 + i, limits[0])
-        middle = VirtualJoint(f"tilt {ROW_NAMES[3 + j]}", j, True, scale, 3 + j, limits[1])
-        last = VirtualJoint("tilt back", i, True, 0.5 * scale, None, limits[0])
-        return [first, middle, last]
-
-    def _twisted(self) -> int:
-        """Return the axis of the row that is never relaxed with one other row of rotation alone.
-
-        Raises
-        ------
-        ProblemError
-            There is none.
-        """
-        ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
-        middles = np.array([0.5 * (a + b) for a, b in pairwise(ends)])
-        pairs = set()
-        for relaxed in self._relaxed(middles)[:, 3:]:
-            if relaxed.sum() == 2:
-                pairs.add(int(np.flatnonzero(~relaxed)[0]))
-        if len(pairs) > 1:
-            raise ProblemError(
-                "relaxations: of the rows rx, ry and rz, two and another two are relaxed at "
-                "different times; give all three one window, or relax no more than two of them"
-            )
-        return pairs.pop() if pairs else 2
-
-    def _relaxed(self, t: Array) -> Flags:
-        """Return the mask of relaxed rows at times t (K,), (K, 6)."""
-        found = np.zeros((len(t), 6), dtype=np.bool_)
-        near = _ROUNDING * self._duration
-        for item in self.relaxations:
-            first, last = item.window(self._duration)
-            started = (t > first + near) | (first <= near)
-            lasts = (t < last - near) | (last >= self._duration - near)
-            found[:, item.indices] |= (started & lasts)[:, None]
-        return found
-
     def held(self, t: Array) -> Flags:
         """Return the mask of joints held at times t (K,), outside of all windows, (K, v)."""
-        relaxed = self._relaxed(t)
+        relaxed = _relaxed(self, t)
         rows = [joint.row for joint in self.each]
         free = [np.ones(len(t), bool) if row is None else relaxed[:, row] for row in rows]
         return np.asarray(~np.stack(free, axis=1))
@@ -271,26 +180,7 @@ class VirtualJoints:
         """
         ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
         middles = [0.5 * (a + b) for a, b in pairwise(ends)]
-        return max(self._allowed(rows, time) for time in middles)
-
-    def _allowed(self, rows: Sequence[int], time: float) -> float:
-        """Return the allowed deviation of rows at a time, 0 where they are not relaxed."""
-        windows = [(item, item.window(self._duration)) for item in self.relaxations]
-        here = [item for item, (first, last) in windows if first < time < last]
-        each = [min((x.band for x in here if row in x.indices), default=0.0) for row in rows]
-        shared = (item.band for item in here if set(rows) <= set(item.indices))
-        return min([float(np.linalg.norm(each)), *shared])
-
-    def joint_of(self, item: Relaxation) -> tuple[int, float] | None:
-        """Return the number of the joint by which a relaxation's one row is off, and its scale.
-
-        None for several rows, or a deviation that is not one joint's coordinate.
-        """
-        tilts = any(joint.name.startswith("tilt") for joint in self.each)
-        if len(item.rows) > 1 or (item.angular and tilts):
-            return None
-        number = next(k for k, joint in enumerate(self.each) if joint.row == item.indices[0])
-        return number, self.each[number].scale
+        return max(_allowed(self, rows, time) for time in middles)
 
     def rows_of(self, item: Relaxation, s: Array) -> tuple[Array, Array]:
         """Return the deviation in a relaxation's rows at coordinates s (K, v): (K, k), (K, k, v).
@@ -305,53 +195,9 @@ class VirtualJoints:
             slopes = np.zeros((len(places), count))
             slopes[np.arange(len(places)), places] = [self.each[k].scale for k in places]
             return s @ slopes.T, np.broadcast_to(slopes, (len(s), *slopes.shape))
-        vector, by = self._tilted(s, turning, own)
+        vector, by = _tilted(self, s, turning, own)
         which = [row - 3 for row in item.indices]
         return vector[:, which], by[:, which]
-
-    def _tilted(self, s: Array, turning: list[int], own: dict[int, int]) -> tuple[Array, Array]:
-        """Return δ of a tilt, and of a twist before it where its row is relaxed, (K, 3)."""
-        first, second = self.each[turning[0]], self.each[turning[1]]
-        i, j = first.axis, second.axis
-        k = 3 - i - j
-        halves = len(turning) == 3
-        a, b = first.scale * s[:, turning[0]], second.scale * s[:, turning[1]]
-        if halves:
-            b = 0.5 * b
-        slope_a, slope_b = first.scale, second.scale * (0.5 if halves else 1.0)
-        real, vector = np.cos(a) * np.cos(b), np.zeros((len(s), 3))
-        vector[:, i], vector[:, j] = np.sin(a) * np.cos(b), np.sin(b)
-        by_real, by_vector = np.zeros(s.shape), np.zeros((len(s), 3, s.shape[1]))
-        by_real[:, turning[0]] = -slope_a * np.sin(a) * np.cos(b)
-        by_real[:, turning[1]] = -slope_b * np.cos(a) * np.sin(b)
-        by_vector[:, i, turning[0]] = slope_a * np.cos(a) * np.cos(b)
-        by_vector[:, i, turning[1]] = -slope_b * np.sin(a) * np.sin(b)
-        by_vector[:, j, turning[1]] = slope_b * np.cos(b)
-        if halves and 3 + k in own:
-            # A quaternion about the third axis comes first.
-            place = own[3 + k]
-            half = 0.5 * self.each[place].scale
-            c, z = np.cos(half * s[:, place])[:, None], np.sin(half * s[:, place])[:, None]
-            axis, cross = np.eye(3)[k], np.cross(np.eye(3)[k], np.eye(3)).T
-            turned = vector @ cross.T
-            by_turned = cross @ by_vector
-            whole = c[:, 0] * real
-            by_whole = c * by_real
-            by_whole[:, place] = -half * z[:, 0] * real
-            by_both = c[:, :, None] * by_vector + z[:, :, None] * by_turned
-            by_both += (z * by_real)[:, None, :] * axis[:, None]
-            by_both[:, :, place] += half * (-z * vector + c * turned)
-            by_both[:, :, place] += half * c * real[:, None] * axis
-            vector = c * vector + z * turned + z * real[:, None] * axis
-            # Of both quaternions of a rotation, the one below half a turn.
-            side = np.where(whole < 0.0, -1.0, 1.0)
-            real, vector = side * whole, side[:, None] * vector
-            by_real, by_vector = side[:, None] * by_whole, side[:, None, None] * by_both
-        size, slope = _angles(real, np.linalg.norm(vector, axis=1))
-        factor = 2.0 if halves else 1.0
-        by = size[:, None, None] * by_vector
-        by += (slope[:, None] * by_real)[:, None, :] * vector[:, :, None]
-        return factor * size[:, None] * vector, factor * by
 
     def coordinates(self, tool: tuple[Array, Array], path: tuple[Array, Array]) -> Array:
         """Return the coordinates that take tools to the path: rotations (K, 3, 3), places (K, 3).
@@ -399,6 +245,174 @@ class VirtualJoints:
         return found
 
 
+def _bands(joints: VirtualJoints, row: int) -> list[float]:
+    return [item.band for item in joints.relaxations if row in item.indices]
+
+
+def _scale(joints: VirtualJoints, row: int) -> float:
+    return min(*_bands(joints, row), joints._lever if row < 3 else 1.0)
+
+
+def _slide(joints: VirtualJoints, row: int) -> VirtualJoint:
+    scale = _scale(joints, row)
+    limit = max(_bands(joints, row)) / scale
+    return VirtualJoint(f"relaxed {ROW_NAMES[row]}", row, False, scale, row, limit, -1.0)
+
+
+def _hinges(
+    joints: VirtualJoints, task: Task, axes: list[int], in_tool: bool
+) -> tuple[list[VirtualJoint], Task]:
+    """Return the hinges, and the rows of the frame behind them that are on the path."""
+    if task is Task.POINTING:
+        together = {item.rows for item in joints.relaxations if item.angular}
+        alone = bool(axes) and {frozenset(rows) for rows in together} != {frozenset(_TILT)}
+        across = [item for item in joints.relaxations if item.in_tool_axes]
+        turned = any(set(item.rows) not in _ROUND for item in across)
+        if not (alone or turned):
+            return (_tilt(joints, *axes, alike=False) if axes else []), task
+        return [_heading(), *_about(joints, axes)], Task.POSE
+    if task is Task.POSITION and in_tool:
+        # The band is in its path's axes, from which the tool may be rotated by any angle.
+        free = [VirtualJoint(f"tilt {k}", k % 2, True, 1.0 if k % 2 else 0.5) for k in range(3)]
+        return [_heading(), *free], Task.POSE
+    return _about(joints, axes), task
+
+
+def _about(joints: VirtualJoints, axes: list[int]) -> list[VirtualJoint]:
+    """Return the hinges of rows of rotation about up to three axes."""
+    if len(axes) < 2:
+        return [_hinge(joints, axis) for axis in axes]
+    if len(axes) == 2:
+        return _tilt(joints, *axes, alike=True)
+    last = _twisted(joints)
+    first, second = (axis for axis in axes if axis != last)
+    return [_hinge(joints, last), *_tilt(joints, first, second, alike=True)]
+
+
+def _hinge(joints: VirtualJoints, axis: int) -> VirtualJoint:
+    row = 3 + axis
+    scale = _scale(joints, row)
+    limit = max(_bands(joints, row)) / scale
+    return VirtualJoint(f"relaxed {ROW_NAMES[row]}", axis, True, scale, row, limit)
+
+
+def _tilt(joints: VirtualJoints, i: int, j: int, *, alike: bool) -> list[VirtualJoint]:
+    """Return the joints that tilt about two axes, without a twist where two turn `alike`."""
+    scale = min(_scale(joints, 3 + i), _scale(joints, 3 + j))
+    limits = [max(_bands(joints, 3 + axis)) / scale for axis in (i, j)]
+    if not alike:
+        return [
+            VirtualJoint(f"tilt {ROW_NAMES[3 + axis]}", axis, True, scale, 3 + axis, limit)
+            for axis, limit in zip((i, j), limits, strict=True)
+        ]
+    first = VirtualJoint(f"tilt {ROW_NAMES[3 + i]}", i, True, 0.5 * scale, 3 + i, limits[0])
+    middle = VirtualJoint(f"tilt {ROW_NAMES[3 + j]}", j, True, scale, 3 + j, limits[1])
+    last = VirtualJoint("tilt back", i, True, 0.5 * scale, None, limits[0])
+    return [first, middle, last]
+
+
+def _twisted(joints: VirtualJoints) -> int:
+    """Return the axis of the row that is never relaxed with one other row of rotation alone.
+
+    Raises
+    ------
+    ProblemError
+        There is none.
+    """
+    ends = sorted({x for item in joints.relaxations for x in item.window(joints._duration)})
+    middles = np.array([0.5 * (a + b) for a, b in pairwise(ends)])
+    pairs = set()
+    for relaxed in _relaxed(joints, middles)[:, 3:]:
+        if relaxed.sum() == 2:
+            pairs.add(int(np.flatnonzero(~relaxed)[0]))
+    if len(pairs) > 1:
+        raise ProblemError(
+            "relaxations: of the rows rx, ry and rz, two and another two are relaxed at "
+            "different times; give all three one window, or relax no more than two of them"
+        )
+    return pairs.pop() if pairs else 2
+
+
+def _relaxed(joints: VirtualJoints, t: Array) -> Flags:
+    """Return the mask of relaxed rows at times t (K,), (K, 6)."""
+    found = np.zeros((len(t), 6), dtype=np.bool_)
+    near = _ROUNDING * joints._duration
+    for item in joints.relaxations:
+        first, last = item.window(joints._duration)
+        started = (t > first + near) | (first <= near)
+        lasts = (t < last - near) | (last >= joints._duration - near)
+        found[:, item.indices] |= (started & lasts)[:, None]
+    return found
+
+
+def _allowed(joints: VirtualJoints, rows: Sequence[int], time: float) -> float:
+    """Return the allowed deviation of rows at a time, 0 where they are not relaxed."""
+    windows = [(item, item.window(joints._duration)) for item in joints.relaxations]
+    here = [item for item, (first, last) in windows if first < time < last]
+    each = [min((x.band for x in here if row in x.indices), default=0.0) for row in rows]
+    shared = (item.band for item in here if set(rows) <= set(item.indices))
+    return min([float(np.linalg.norm(each)), *shared])
+
+
+def joint_of(joints: VirtualJoints, item: Relaxation) -> tuple[int, float] | None:
+    """Return the number of the joint by which a relaxation's one row is off, and its scale.
+
+    None for several rows, or a deviation that is not one joint's coordinate.
+    """
+    tilts = any(joint.name.startswith("tilt") for joint in joints.each)
+    if len(item.rows) > 1 or (item.angular and tilts):
+        return None
+    number = next(k for k, joint in enumerate(joints.each) if joint.row == item.indices[0])
+    return number, joints.each[number].scale
+
+
+def _tilted(
+    joints: VirtualJoints, s: Array, turning: list[int], own: dict[int, int]
+) -> tuple[Array, Array]:
+    """Return δ of a tilt, and of a twist before it where its row is relaxed, (K, 3)."""
+    first, second = joints.each[turning[0]], joints.each[turning[1]]
+    i, j = first.axis, second.axis
+    k = 3 - i - j
+    halves = len(turning) == 3
+    a, b = first.scale * s[:, turning[0]], second.scale * s[:, turning[1]]
+    if halves:
+        b = 0.5 * b
+    slope_a, slope_b = first.scale, second.scale * (0.5 if halves else 1.0)
+    real, vector = np.cos(a) * np.cos(b), np.zeros((len(s), 3))
+    vector[:, i], vector[:, j] = np.sin(a) * np.cos(b), np.sin(b)
+    by_real, by_vector = np.zeros(s.shape), np.zeros((len(s), 3, s.shape[1]))
+    by_real[:, turning[0]] = -slope_a * np.sin(a) * np.cos(b)
+    by_real[:, turning[1]] = -slope_b * np.cos(a) * np.sin(b)
+    by_vector[:, i, turning[0]] = slope_a * np.cos(a) * np.cos(b)
+    by_vector[:, i, turning[1]] = -slope_b * np.sin(a) * np.sin(b)
+    by_vector[:, j, turning[1]] = slope_b * np.cos(b)
+    if halves and 3 + k in own:
+        # A quaternion about the third axis comes first.
+        place = own[3 + k]
+        half = 0.5 * joints.each[place].scale
+        c, z = np.cos(half * s[:, place])[:, None], np.sin(half * s[:, place])[:, None]
+        axis, cross = np.eye(3)[k], np.cross(np.eye(3)[k], np.eye(3)).T
+        turned = vector @ cross.T
+        by_turned = cross @ by_vector
+        whole = c[:, 0] * real
+        by_whole = c * by_real
+        by_whole[:, place] = -half * z[:, 0] * real
+        by_both = c[:, :, None] * by_vector + z[:, :, None] * by_turned
+        by_both += (z * by_real)[:, None, :] * axis[:, None]
+        by_both[:, :, place] += half * (-z * vector + c * turned)
+        by_both[:, :, place] += half * c * real[:, None] * axis
+        vector = c * vector + z * turned + z * real[:, None] * axis
+        # Of both quaternions of a rotation, the one below half a turn.
+        side = np.where(whole < 0.0, -1.0, 1.0)
+        real, vector = side * whole, side[:, None] * vector
+        by_real, by_vector = side[:, None] * by_whole, side[:, None, None] * by_both
+    size, slope = _angles(real, np.linalg.norm(vector, axis=1))
+    factor = 2.0 if halves else 1.0
+    by = size[:, None, None] * by_vector
+    by += (slope[:, None] * by_real)[:, None, :] * vector[:, :, None]
+    return factor * size[:, None] * vector, factor * by
+
+
 _TILT = ("rx", "ry")
 # Sets of rows that are invariant to a rotation about the tool's axis.
 _ROUND: tuple[set[str], ...] = ({"z"}, {"x", "y"}, set(POSITION_ROWS))
@@ -420,3 +434,7 @@ def _angles(cosine: Array, sine: Array) -> tuple[Array, Array]:
         (angle * cosine - sine) / safe**3,
     )
     return size, slope
+
+
+# Those of a path without tolerances.
+NO_VIRTUAL_JOINTS = VirtualJoints(Task.POSE, (), 1.0, 1.0)

@@ -15,7 +15,7 @@ from selfmotion.paper.study.published import (
     published_null_motion,
     published_optimizer,
 )
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.planner import plan
@@ -66,7 +66,7 @@ class Scale:
 def bind(problem: Problem, steps: int = 64) -> Objective:
     """Return the objective of a problem on a grid of about `steps` Runge-Kutta steps."""
     grid = Grid.aligned(problem.path.knots, steps)
-    formulation = Formulation.on_path(problem)
+    formulation = on_path(problem)
     at_zero = MinimumNormMotion.on(formulation, start_of(problem), grid)
     return Objective.of(formulation, at_zero)
 

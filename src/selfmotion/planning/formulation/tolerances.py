@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Column, Quantity
-from selfmotion.model.follow import RelaxedFrames, VirtualJoints
+from selfmotion.model.follow import Follows, VirtualJoints, joint_of, limits_within
 from selfmotion.model.task import ROW_NAMES, Relaxation
 from selfmotion.problem.constraints import (
     BoundConstraint,
@@ -56,7 +56,7 @@ class WithinBand(BoundQuantity):
         return found
 
     @classmethod
-    def of(cls, item: Relaxation, follows: RelaxedFrames) -> "WithinBand":
+    def of(cls, item: Relaxation, follows: Follows) -> "WithinBand":
         """Return that of a relaxation with a band."""
         first, last = item.window(follows.duration)
         return cls(_band(item, follows.virtual), _margin(item), (first, last))
@@ -98,12 +98,12 @@ class RowWithinBand(BoundLimits):
     depends_on: ClassVar[DependsOn] = DependsOn.TOLERANCES
 
     @classmethod
-    def of_row(cls, item: Relaxation, follows: RelaxedFrames) -> "RowWithinBand | None":
+    def of_row(cls, item: Relaxation, follows: Follows) -> "RowWithinBand | None":
         """Return that of a relaxation.
 
         None where no joint's coordinate is its deviation, or that has other bands in other windows.
         """
-        joint = follows.virtual.joint_of(item)
+        joint = joint_of(follows.virtual, item)
         shared = [each for each in follows.virtual.relaxations if item.indices[0] in each.indices]
         if joint is None or len(shared) > 1:
             return None
@@ -124,7 +124,7 @@ class RowWithinBand(BoundLimits):
         )
 
     @classmethod
-    def of_each(cls, item: Relaxation, follows: RelaxedFrames) -> "RowWithinBand | None":
+    def of_each(cls, item: Relaxation, follows: Follows) -> "RowWithinBand | None":
         """Return limits of each of the joints of a relaxation's rows, which bands imply.
 
         None where a joint is its one row's deviation, or all rows are free at some time.
@@ -132,9 +132,9 @@ class RowWithinBand(BoundLimits):
         Near its path the length of several rows has no slope: only limits tell a step how far the
         band goes. They hold at all times: of bands in several windows the widest one counts.
         """
-        bounds = follows.limits_within(item)[follows.robot.dof :]
+        bounds = limits_within(follows, item)[follows.robot.dof :]
         joints = np.flatnonzero(np.isfinite(bounds))
-        if follows.virtual.joint_of(item) is not None or not joints.size:
+        if joint_of(follows.virtual, item) is not None or not joints.size:
             return None
         each = follows.virtual.each
         rows = [cast(int, each[k].row) for k in joints]
@@ -175,7 +175,7 @@ def _margin(item: Relaxation) -> float:
     return min(max(_MARGIN, _LEAST / item.band), _MOST)
 
 
-def widest_band(item: Relaxation, follows: RelaxedFrames) -> Quantity:
+def widest_band(item: Relaxation, follows: Follows) -> Quantity:
     """Return how far rows are off the path, of all coordinates, within the widest band.
 
     That which they have at any time.
@@ -238,7 +238,7 @@ def _band(item: Relaxation, virtual: VirtualJoints) -> Quantity:
     )
 
 
-def band_conditions(follows: RelaxedFrames, relaxations: Sequence[Relaxation]) -> Conditions:
+def band_conditions(follows: Follows, relaxations: Sequence[Relaxation]) -> Conditions:
     """Return the conditions that rows stay within their bands.
 
     A row that is one joint's coordinate has limits, others are quantities of δ, with limits of each

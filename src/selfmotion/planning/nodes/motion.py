@@ -12,6 +12,7 @@ from selfmotion.planning.formulation import (
     CurveSamples,
     Formulation,
     SampledMotion,
+    sampled,
 )
 from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
@@ -245,7 +246,7 @@ class NodeMotion:
         """The motion at the Gauss points."""
         grid = self.grid
         every = CurveSamples(grid.manifolds.follows, grid.spline.sampling, partial(_at_gauss, self))
-        return grid.formulation.sampled(every)
+        return sampled(grid.formulation, every)
 
     @cached_property
     def checked(self) -> SampledMotion:
@@ -253,7 +254,7 @@ class NodeMotion:
         grid = self.grid
         at = partial(grid.spline.at_points, ends=self.curve_ends)
         every = CurveSamples(grid.manifolds.follows, grid.spline.points, at)
-        return grid.formulation.sampled(every)
+        return sampled(grid.formulation, every)
 
     @cached_property
     def terms(self) -> dict[str, float]:
@@ -394,8 +395,8 @@ def forget(motion: NodeMotion) -> None:
 
 def on_grid(motion: NodeMotion, grid: NodeGrid) -> "NodeMotion | None":
     """Return the motion on other nodes."""
-    own = motion.trajectory
-    q, qd, qdd = (own(grid.t, order) for order in range(3))
+    curve = motion.trajectory
+    q, qd, qdd = (curve(grid.t, order) for order in range(3))
     # Approximate bases suffice as a start, and rotate like the ones around.
     last = np.searchsorted(motion.grid.t, grid.t, side="right") - 1
     return grid.around(Charts(grid.manifolds, q, motion.charts.bases[last]), qd, qdd)

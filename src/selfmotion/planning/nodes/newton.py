@@ -9,7 +9,7 @@ violate limits or be inside a body. Each step is Newton's for the perturbed KKT 
 Fletcher, "Practical Methods of Optimization", 2nd ed., 14.3). Eliminating the steps of s, e and λ
 leaves a matrix of the nodes alone. Each row involves two neighbours, so that the matrix is
 block-tridiagonal, and a step takes time in proportion to the number of nodes. A step moves the
-curve along linear rows, and is retracted onto the path, see `NodeMotion.along`.
+curve along linear rows, and is retracted onto the path, see `moved_along`.
 """
 
 from collections.abc import Callable

@@ -201,7 +201,7 @@ def _points(cost: NodeCost, order: int, forms: Array) -> Points:
 
 
 def _directions(cost: NodeCost, by: EndChanges) -> Array:
-    """Return orthonormal cost-motion directions at the samples, (S, n, r).
+    """Return orthonormal self-motion directions at the samples, (S, n, r).
 
     Interpolated between the nodes.
     """

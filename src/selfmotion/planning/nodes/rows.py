@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.motion import Sampling
-from selfmotion.planning.formulation import CurveSamples, Formulation, SampledMotion
+from selfmotion.planning.formulation import CurveSamples, Formulation, SampledMotion, sampled
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.point_rows import CollocationRows, PointRows
@@ -215,7 +215,7 @@ def sampled_curve(formulation: Formulation, spline: Quintic, ends: Array) -> Sam
     def at(order: int) -> Array:
         return spline.at(_AT_CHECKED, order, ends).reshape(-1, ends.shape[2])
 
-    return formulation.sampled(CurveSamples(formulation.follows, Sampling.trapezoidal(times), at))
+    return sampled(formulation, CurveSamples(formulation.follows, Sampling.trapezoidal(times), at))
 
 
 @dataclass(frozen=True, eq=False)

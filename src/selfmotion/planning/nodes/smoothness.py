@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.model.follow import window_edges
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.spline import Quintic
 from selfmotion.problem.costs import JointVelocity, Samples
@@ -72,7 +73,7 @@ def smoothing_of(
 
 def rest_times(formulation: Formulation) -> Array:
     """Return the ends at which the arm rests, (k,) [s]."""
-    both = zip(formulation.problem.rests, (0.0, formulation.path.duration), strict=True)
+    both = zip(formulation.problem.rest_orders, (0.0, formulation.path.duration), strict=True)
     return np.array([end for rest, end in both if rest])
 
 
@@ -81,7 +82,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
 
     The present share `quick`, unless its penalty is too large.
     """
-    if _is_smooth(formulation) or not any(formulation.problem.rests):
+    if _is_smooth(formulation) or not any(formulation.problem.rest_orders):
         return quick
     shares = _of_rest(formulation, samples.sampling.t, quick)
     squares = shares * (samples.qdd**2 @ _weights(formulation))
@@ -115,7 +116,7 @@ def _of_held(formulation: Formulation, t: Array) -> tuple[Array, Array]:
     """
     starting = _STARTING * formulation.path.duration
     faded = np.zeros_like(t)
-    for edge in formulation.follows.edges:
+    for edge in window_edges(formulation.follows):
         faded = np.maximum(faded, _faded(t - edge, starting))
     return starting**2 * faded, starting**4 * faded
 

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Follows, kinematics_of, null_basis_at
 from selfmotion.model.kernels import carried
 from selfmotion.model.motion import Grid, NullMotion, NullMotionTable, fading_window
 from selfmotion.model.robot import null_space
@@ -68,9 +68,9 @@ class FreeStart:
 
     def __init__(self, follows: Follows, reference: Array) -> None:
         self._follows, self._reference = follows, reference
-        self._null = follows.null_basis(reference)
+        self._null = null_basis_at(follows, reference)
         self._at = reference
-        self._tips = follows.kinematics()
+        self._tips = kinematics_of(follows)
 
     @property
     def size(self) -> int:
@@ -272,7 +272,8 @@ def null_motion_table(
 
 def _brought_to_rest(formulation: Formulation, t: Array, epsilon: Array) -> Array:
     """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-    fading = fading_window(t, formulation.path.duration, formulation.problem.rests)
+    start, end = formulation.problem.rest_orders
+    fading = fading_window(t, formulation.path.duration, (start > 0, end > 0))
     return epsilon * fading[:, None]
 
 

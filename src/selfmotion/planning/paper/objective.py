@@ -371,7 +371,7 @@ def node_tangents(objective: Objective, x: Array) -> NodeTangents:
 def _error_tangent(objective: Objective, by_q: Array) -> Array:
     """Return ∂(S e)/∂x = -J ∂q/∂x, (S, m, size).
 
-    Nothing on the path, where the objective-motion does not move the tool.
+    Nothing on the path, where the self-motion does not move the tool.
     """
     return np.asarray(-(objective.rollout.samples().task_jacobian @ by_q))
 

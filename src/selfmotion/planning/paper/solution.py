@@ -16,7 +16,7 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.model.motion import Evaluation, Grid, NullMotion
+from selfmotion.model.motion import Evaluation, Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import (
     Callback,
@@ -154,11 +154,6 @@ class Solution:
     inverse_hessian: Array | None = None
     status: Status = Status.STOPPED
     history: tuple[Iteration, ...] = ()
-
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of the null motion."""
-        return self.method.formulation.problem.null_motion
 
     @property
     def coefficients(self) -> Array:

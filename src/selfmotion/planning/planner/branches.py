@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Progress, SelfmotionError, presses, silent
-from selfmotion.planning.formulation import Formulation
+from selfmotion.model.follow import within_limits
+from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import rough_grid
@@ -132,7 +133,7 @@ def _room(problem: Problem) -> Room:
 def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     """Return allowed starts, each as far as any from those before, the first in the middle."""
     allowed = problem.envelope
-    follows = problem.follows.within(allowed.lower, allowed.upper)
+    follows = within_limits(problem.follows, allowed.lower, allowed.upper)
     own, room = follows.coordinates, _room(problem)
     try:
         starts = np.array(start_candidates(follows, Search().starts, rng, room.free))
@@ -142,7 +143,7 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     if not len(starts):
         return []
     # Wrists start near their usual angle, not a turn away.
-    motions, arrived = carried(follows, starts, rough_grid(Formulation.on_path(problem)).nodes)
+    motions, arrived = carried(follows, starts, rough_grid(on_path(problem)).nodes)
     back = np.array([wound_back(own, motion)[0] for motion in motions])
     starts = np.where((arrived & room.free(back))[:, None], back, starts)
     distances = np.abs(starts[:, None] - starts) @ own.weights

@@ -31,7 +31,7 @@ from selfmotion.planning.planner.run import plan, with_ending
 from selfmotion.planning.result import Plan, check_no_feed, rate_limits, retime
 from selfmotion.problem.constraints import Constraint, JointPositionLimits, JointVelocityLimits
 from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
-from selfmotion.problem.problem import Problem, check_problem
+from selfmotion.problem.problem import Problem, along_other_paths, check_problem
 
 # Default deadline [s].
 _FASTEST_DEADLINE = 60.0
@@ -411,7 +411,7 @@ def _at_pace(problem: Problem, pace: _Repaced) -> Problem:
     """Return a problem along a path at another pace, with the windows of its tolerances there."""
     path = pace(problem.path)
     when = path.when if isinstance(path, Retimed) else np.asarray
-    return replace(problem, **problem.along(pace, when))
+    return replace(problem, **along_other_paths(problem, pace, when))
 
 
 def _own(path: Path) -> Path:

@@ -1,6 +1,7 @@
 """Other motions to begin from, where the optimum near a guess violates conditions."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -36,7 +37,7 @@ def smoothest(begun: NodeMotion, recorder: Recorder) -> Iterator[NodeMotion]:
     costs = _costs_of_limits(begun)
     if not costs:
         return
-    formulation, motion = begun.grid.formulation.with_costs(costs), begun
+    formulation, motion = replace(begun.grid.formulation, costs=tuple(costs)), begun
     for number in range(_SMOOTHING_ROUNDS):
         ends = BoundConditions(ends=motion.grid.conditions.ends)
         counts, free = begun.grid.counts, begun.grid.free

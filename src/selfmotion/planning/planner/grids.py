@@ -3,6 +3,7 @@
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.model.follow import linear_rows, window_edges
 from selfmotion.model.motion import FreeNullMotion, Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import NodeMotion, on_grid, rest_times
@@ -62,7 +63,10 @@ def with_starts(formulation: Formulation, t: Array, quick: float) -> Array:
     starts or ends to be held.
     """
     duration = formulation.path.duration
-    for times, share in ((rest_times(formulation), quick), (formulation.follows.edges, 1.0)):
+    for times, share in (
+        (rest_times(formulation), quick),
+        (window_edges(formulation.follows), 1.0),
+    ):
         least = share * _STARTING * duration
         farther = np.arange(2 + int(np.ceil(np.log(1.0 / share) / np.log(_FARTHER))))
         away = least * _FARTHER**farther
@@ -82,7 +86,7 @@ def _with_short_segments(formulation: Formulation, t: Array, steps: int) -> Arra
     knots, follows = np.asarray(formulation.knots), formulation.follows
     samples = Grid.aligned(knots, _LENGTH_SAMPLES).nodes
     reach = formulation.robot.reach if np.isfinite(formulation.robot.reach) else 1.0
-    counts = np.where(follows.linear > 0.0, 1.0 / reach, 1.0)
+    counts = np.where(linear_rows(follows) > 0.0, 1.0 / reach, 1.0)
     speeds = np.linalg.norm(follows.twists(0.5 * (samples[:-1] + samples[1:])) * counts, axis=1)
     length_at = np.append(0.0, np.cumsum(speeds * np.diff(samples)))
     lengths = np.diff(length_at[np.searchsorted(samples, knots)])

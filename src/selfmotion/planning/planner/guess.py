@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, InverseKinematicsError, ProblemError, shown
+from selfmotion.model.follow import is_plain
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.formulation import BoundConditions, Formulation
+from selfmotion.planning.formulation import BoundConditions, Formulation, with_windows_shut
 from selfmotion.planning.paper import Guide, MinimumNormMotion, converged_minimum_norm
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, most_nodes
@@ -43,7 +44,7 @@ def on_start(formulation: Formulation, seed: Array) -> Array:
     """
     follows, robot = formulation.follows, formulation.robot
     own = follows.coordinates
-    if not follows.is_plain:
+    if not is_plain(follows):
         manifold = Manifold(follows, own.lower, own.upper)
         held = follows.held(np.zeros(1))
         q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)
@@ -193,7 +194,7 @@ def _begun(
     It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
     cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
     """
-    shut = formulation.with_windows_shut
+    shut = with_windows_shut(formulation)
     try:
         return converged_minimum_norm(shut, start, guide, grid)
     except BreakdownError:

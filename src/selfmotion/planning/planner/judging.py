@@ -7,7 +7,7 @@ import numpy as np
 from selfmotion.basics import Progress
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.model.motion import Evaluation, Trajectory
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import Formulation, certified, path_errors
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import MOST_HALVINGS
 from selfmotion.planning.planner.largest_part import Part
@@ -160,7 +160,7 @@ class _ByPath:
         if self._rounds == 0:
             return None
         self._rounds -= 1
-        errors = self._formulation.errors_between(motion.trajectory) / self._allowed
+        errors = path_errors(self._formulation, motion.trajectory) / self._allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
         stuck = not worst < _FALLS * self._worst or len(errors) > solution.most_steps
@@ -214,7 +214,7 @@ def _same(
 def _check(formulation: Formulation, part: Part, tolerance: Tolerance) -> Judged:
     by = _ByPath(formulation, tolerance)
     solution = refined(part.solution, by)
-    certificate = formulation.certify(by.motion.trajectory, tolerance, part.ending)
+    certificate = certified(formulation, by.motion.trajectory, tolerance, part.ending)
     resolved = replace(part, solution=solution)
     return Judged(resolved, by.motion, solution.minimum_norm_evaluation, certificate)
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, RedundancyError
+from selfmotion.model.follow import completed, null_basis_at
 from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import Formulation, keeps_off_itself, with_windows_shut
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import Guide, MinimumNormMotion
 from selfmotion.planning.planner.effort import Effort, Search
@@ -16,6 +17,7 @@ from selfmotion.planning.planner.screening import ROUGH_MOTIONS
 from selfmotion.planning.planner.solution import Solution
 from selfmotion.planning.planner.solve import solve
 from selfmotion.planning.search import Reach
+from selfmotion.problem.problem import along_other_paths
 
 # Share of the time to the edge of the workspace that is left out: joint speeds grow without bound
 # there.
@@ -211,16 +213,18 @@ def _until(formulation: Formulation, time: float) -> Formulation:
     if time >= formulation.path.duration:
         return formulation
     remaining = [item for item in formulation.problem.constraints if not item.ends.is_about(1)]
-    shorter = formulation.along(
-        lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
+    shorter = along_other_paths(
+        formulation.problem,
+        lambda path: Section(path, 0.0, time, crowding=True),
+        lambda t: np.minimum(t, time),
     )
-    return formulation.changed(**shorter, constraints=remaining)
+    return Formulation.of(formulation.problem.changed(**shorter, constraints=remaining))
 
 
 def _start_of(part: Formulation, formulation: Formulation, q: Array) -> Array:
     """Return a start (n,) of a problem as one of its part, which may have fewer joints."""
     own = q[None, : formulation.robot.dof]
-    return np.asarray(part.completed(np.zeros(1), own)[0])
+    return np.asarray(completed(part.follows, np.zeros(1), own)[0])
 
 
 def _start_guess_of(part: Formulation, failed: _Attempt) -> _StartGuess:
@@ -255,7 +259,7 @@ def _attempt(formulation: Formulation, start_guess: _StartGuess, effort: Effort)
 
 def _apart(formulation: Formulation, starts: list[Array]) -> list[Array]:
     """Return the starts at which the arm does not meet itself; all where it always does."""
-    return [q for q in starts if formulation.keeps_off_itself(q[None])] or starts
+    return [q for q in starts if keeps_off_itself(formulation, q[None])] or starts
 
 
 def _beginnings(formulation: Formulation, starts: list[Array]) -> list[_StartGuess]:
@@ -290,7 +294,7 @@ class _Push:
 
 def _pushes(formulation: Formulation, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may stay in a plane without a continuation."""
-    basis = formulation.follows.null_basis(start) / formulation.path.duration
+    basis = null_basis_at(formulation.follows, start) / formulation.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 
@@ -304,7 +308,7 @@ def _rank(
     """
     path = formulation.path
     grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
-    minimum_norm = MinimumNormMotion.on(formulation.with_windows_shut, start, grid, guide)
+    minimum_norm = MinimumNormMotion.on(with_windows_shut(formulation), start, grid, guide)
     trouble = minimum_norm.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
     remaining = _kept_until(formulation, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)

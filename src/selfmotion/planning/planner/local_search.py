@@ -188,7 +188,9 @@ class LocalSearch:
         t = optimum.motion.grid.t
         ends = t[0] + (t[1] - t[0]) * _BESIDE_REST, t[-1] - (t[-1] - t[-2]) * _BESIDE_REST
         beside = [
-            own for rest, own in zip(self.formulation.problem.rests, ends, strict=True) if rest
+            own
+            for rest, own in zip(self.formulation.problem.rest_orders, ends, strict=True)
+            if rest
         ]
         finer = np.unique(np.concatenate([Grid(t).halved().nodes, *beside]))
         motion = on_grid(optimum.motion, optimum.motion.grid.on(finer))

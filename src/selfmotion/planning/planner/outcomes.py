@@ -14,6 +14,8 @@ from selfmotion.planning.formulation import (
     BoundConditions,
     Formulation,
     SampledMotion,
+    keeps_off_itself,
+    sampled,
 )
 from selfmotion.planning.nodes import (
     NodeMotion,
@@ -107,7 +109,7 @@ class MinimumNormOutcome:
     @cached_property
     def sampled(self) -> SampledMotion:
         """The motion at the stages of its integration."""
-        return self.formulation.sampled(self.motion.rollout.samples())
+        return sampled(self.formulation, self.motion.rollout.samples())
 
     @cached_property
     def terms(self) -> dict[str, float]:
@@ -130,7 +132,7 @@ class MinimumNormOutcome:
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return self.formulation.keeps_off_itself(self.motion.q)
+        return keeps_off_itself(self.formulation, self.motion.q)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
@@ -184,7 +186,7 @@ class PublishedOutcome(paper.Solution):
 
     @property
     def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
-        motion = self.method.formulation.sampled(self.objective.samples(self.x))
+        motion = sampled(self.method.formulation, self.objective.samples(self.x))
         return motion.with_conditions(self.conditions.every)
 
     @cached_property
@@ -195,7 +197,7 @@ class PublishedOutcome(paper.Solution):
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return self.method.formulation.keeps_off_itself(self.nodes)
+        return keeps_off_itself(self.method.formulation, self.nodes)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
@@ -203,7 +205,7 @@ class PublishedOutcome(paper.Solution):
 
     def facts(self) -> OutcomeFacts:
         """Return what a report says of it: constraints are judged, not required."""
-        return OutcomeFacts(self.null_motion, self.coefficients)
+        return OutcomeFacts(self.method.formulation.problem.null_motion, self.coefficients)
 
     def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, for all or some of the steps (N,).
@@ -267,7 +269,7 @@ class NodeOutcome:
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return self.motion.grid.formulation.keeps_off_itself(self.motion.place.q)
+        return keeps_off_itself(self.motion.grid.formulation, self.motion.place.q)
 
     @cached_property
     def violations(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.model.path import Line, Retimed, Section, section_at_rest
 from selfmotion.model.task import SE3
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import on_path
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.run import plan, plan_along
 from selfmotion.planning.result import Move, Parts, Plan
@@ -43,6 +43,7 @@ from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.costs import JointVelocity
 from selfmotion.problem.problem import (
     Problem,
+    along_other_paths,
     at_all_times,
     check_feeds_of,
     check_problem,
@@ -232,7 +233,7 @@ class _PartPlanner:
         path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
-            **whole.along(lambda _: path, times_along(path, ends)),
+            **along_other_paths(whole, lambda _: path, times_along(path, ends)),
             start=whole.start if segment.first == 0 else None,
             constraints=list(constraints_of_part(whole, segment.first == 0, segment.last == last)),
             rest=True,
@@ -315,7 +316,7 @@ def _parts(
 ) -> Parts:
     # Samples of curves prove that parts are needed; those of larger spaces may miss chains, and all
     # are on the path itself.
-    formulation = Formulation.on_path(problem)
+    formulation = on_path(problem)
     proves = has_curves(formulation) and not problem.relaxations
     allowed_cuts = 0 if proves else _MISSED_CUTS
     refused, chains = None, []

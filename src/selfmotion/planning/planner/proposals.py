@@ -24,9 +24,10 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
+from selfmotion.model.follow import completed, within_limits
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import Formulation, without_tolerances
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, broken_intervals
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
@@ -48,7 +49,7 @@ from selfmotion.planning.search import (
     shortest_along,
     start_candidates,
 )
-from selfmotion.problem.problem import constraints_of_part
+from selfmotion.problem.problem import along_other_paths, constraints_of_part
 
 # Length of a long path, in reaches of the arm: x = 0 starts to drift.
 LONG_PATH = 5.0
@@ -190,7 +191,7 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
     places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
     found = dict[int, Array]()
     allowed = formulation.envelope
-    arm = formulation.follows.within(allowed.lower, allowed.upper)
+    arm = within_limits(formulation.follows, allowed.lower, allowed.upper)
     for place in sorted(places):
         with contextlib.suppress(InverseKinematicsError):
             # Few random ones satisfy all conditions: they are moved there.
@@ -215,12 +216,12 @@ def _starts(planner: Planner, count: int) -> list[Array]:
     """Return `count` starts: on the path itself, or as near to it as tolerances allow."""
     formulation = planner.formulation
     try:
-        found = _drawn(formulation.without_tolerances, planner, count)
+        found = _drawn(without_tolerances(formulation), planner, count)
     except InverseKinematicsError:
         if not formulation.problem.relaxations:
             raise
         return _drawn(formulation, planner, count)
-    return list(formulation.completed(np.zeros(len(found)), np.array(found)))
+    return list(completed(formulation.follows, np.zeros(len(found)), np.array(found)))
 
 
 def _drawn(
@@ -228,7 +229,7 @@ def _drawn(
 ) -> list[Array]:
     """Return `count` configurations on the path at a time [s]."""
     allowed = formulation.envelope
-    follows = formulation.follows.within(allowed.lower, allowed.upper)
+    follows = within_limits(formulation.follows, allowed.lower, allowed.upper)
     admits = allowed.admits if allowed.quantities else None
     return start_candidates(follows, count, planner.rng, admits, time)
 
@@ -443,13 +444,14 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     formulation = planner.formulation
     middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / formulation.length_in_reaches
     first, last = (formulation.path.duration * share for share in (middle - half, middle + half))
-    section = formulation.changed(
-        **formulation.along(lambda path: Section(path, first, last)),
+    problem = formulation.problem
+    section = problem.changed(
+        **along_other_paths(problem, lambda path: Section(path, first, last)),
         start=None,
-        constraints=list(constraints_of_part(formulation.problem, is_first=False, is_last=False)),
+        constraints=list(constraints_of_part(problem, is_first=False, is_last=False)),
         rest=False,
     )
-    own = replace(planner.setup, formulation=section)
+    own = replace(planner.setup, formulation=Formulation.of(section))
     inner = replace(
         planner,
         setup=own,

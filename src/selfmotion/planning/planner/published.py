@@ -36,7 +36,8 @@ def _first(guess: Guess) -> PublishedOutcome:
     """Return the minimum-norm motion as the start of the published method."""
     effort, formulation, begun = guess.effort, guess.formulation, guess.minimum_norm.motion
     if isinstance(formulation.problem.null_motion, FreeNullMotion):
-        formulation = formulation.changed(null_motion=PolynomialNullMotion())
+        polynomial = formulation.problem.changed(null_motion=PolynomialNullMotion())
+        formulation = Formulation.of(polynomial)
     ends, most = guess.conditions.ends, effort.max_evaluations
     limit = None if most is None else effort.counts.evaluations + most
     own = QuasiNewton() if effort.optimizer is None else effort.optimizer

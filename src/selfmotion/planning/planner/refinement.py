@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from selfmotion.basics import Array, Ints
+from selfmotion.planning.formulation import path_errors
 from selfmotion.planning.nodes import (
     NodeMotion,
     broken_intervals,
@@ -115,7 +116,7 @@ class DividesAtNodes:
         if again is not None and again.has_arrived:
             return again
         # Between few nodes it may be off the path: there, what is on the way will do.
-        errors = self._search.formulation.errors_between(known.motion.trajectory)
+        errors = path_errors(self._search.formulation, known.motion.trajectory)
         off = not polishes and again is None and errors.max() > _NEAR_PATH
         return found if off else known
 
@@ -147,7 +148,7 @@ def _finer(search: LocalSearch, known: NodeOutcome) -> Array | None:
     """Return times of nodes near enough to each other, or None where these are."""
     motion = known.motion
     grid, spline = motion.grid, motion.grid.spline
-    errors = search.formulation.errors_between(motion.trajectory).max(axis=1)
+    errors = path_errors(search.formulation, motion.trajectory).max(axis=1)
     # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
     wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
     parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)

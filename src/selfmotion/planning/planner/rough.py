@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model.follow import Coordinates
-from selfmotion.planning.formulation import BoundConditions, Formulation
+from selfmotion.planning.formulation import BoundConditions, Formulation, keeps_off_itself
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import NOTHING, UNKEPT, rough_grid
@@ -150,7 +150,7 @@ class RoughMotions:
 
     def is_clear(self, motion: NodeMotion) -> bool:
         """Return whether a motion keeps the arm off itself."""
-        return self._formulation.keeps_off_itself(motion.place.q)
+        return keeps_off_itself(self._formulation, motion.place.q)
 
 
 def cheapest(found: Batch) -> Ints:

@@ -20,7 +20,8 @@ from selfmotion.basics import (
     was_interrupted,
 )
 from selfmotion.certificate import Certificate, Tolerance
-from selfmotion.planning.formulation import Formulation
+from selfmotion.model.follow import completed
+from selfmotion.planning.formulation import Formulation, arm_motion, motion_of_all
 from selfmotion.planning.optimise import Callback, Optimizer, Status
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
 from selfmotion.planning.planner.grids import uses_published_method
@@ -92,8 +93,8 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
     )
     return Plan(
         problem=planner.formulation.problem,
-        trajectory=planner.formulation.of_arm(motion.trajectory),
-        initial_trajectory=planner.formulation.of_arm(minimum_norm.trajectory),
+        trajectory=arm_motion(planner.formulation, motion.trajectory),
+        initial_trajectory=arm_motion(planner.formulation, minimum_norm.trajectory),
         coefficients=read_only(facts.coefficients),
         report=report,
         certificate=report.explained(check),
@@ -259,7 +260,7 @@ def plan(
             "would leave its tolerances; leave null_motion out, optimizer and damping too"
         )
     if warm_start is not None:
-        known = formulation.of_all(warm_start.trajectory, warm_start.path)
+        known = motion_of_all(formulation, warm_start.trajectory, warm_start.path)
         warm_start = replace(warm_start, trajectory=known)
     setup = Setup(
         formulation,
@@ -286,7 +287,7 @@ def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress
     clock = Deadline()
     effort = Effort(None, None, None, clock)
     formulation = Formulation.of(problem)
-    guide = replace(guide, q=formulation.completed(guide.t, guide.q))
+    guide = replace(guide, q=completed(formulation.follows, guide.t, guide.q))
     planner = Planner(Setup(formulation, Search(), tolerance, progress, guide=guide), effort)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)

@@ -6,8 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Progress
+from selfmotion.model.follow import generic_values
 from selfmotion.model.motion import Sampling, Trajectory
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import (
+    Formulation,
+    cost_of_motion,
+    sampled,
+    sampled_along,
+    with_springs,
+)
 from selfmotion.planning.nodes import Batch, NodeMotion, breaks_hard, minimise
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import ABOUT_AS_GOOD, resolves
@@ -139,8 +146,8 @@ class Ranking:
         if self._rough.free:
             motions = np.array([wound_back(self._rough.coordinates, motion) for motion in motions])
         curves = [CubicSpline(t, motion) for motion in motions]
-        each = [formulation.sampled_along(sampling, q(t), q(t, 1)) for q in curves]
-        costs = np.array([formulation.cost_of(motion) for motion in each])
+        each = [sampled_along(formulation, sampling, q(t), q(t, 1)) for q in curves]
+        costs = np.array([cost_of_motion(formulation, motion) for motion in each])
         cheapest = np.argsort(costs, kind="stable")
         alone = unlike(motions, cheapest, self._rough.apart, ONE_VALLEY)[0][:ROUGH_MOTIONS]
         merits = dict[int, float]()
@@ -165,7 +172,7 @@ class Ranking:
         costs = formulation.costs
         if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
             return False
-        q = formulation.coordinates.generic()[0]
+        q = generic_values(formulation.coordinates)[0]
         return not formulation.conditions(q, q, apart=False).ends
 
     def _freely(self, motions: Array, finalists: int) -> list[NodeMotion] | None:
@@ -178,7 +185,7 @@ class Ranking:
         total = 1 + ROUGH_ROUNDS
         self._progress("screening start", 1, total)
         found = self._found = Batch.near(nodes, motions)
-        soft = formulation.with_springs(float(found.costs.min()))
+        soft = with_springs(formulation, float(found.costs.min()))
         if soft is not formulation:
             found = self._found = Batch.near(self._rough.grid(soft), motions)
         alone, near = unlike(found.q, cheapest(found), self._rough.apart, ONE_VALLEY)
@@ -322,5 +329,5 @@ def _merit(formulation: Formulation, q: Array, twists: Array, sampling: Sampling
     except np.linalg.LinAlgError:
         return np.inf
     samples = replace(minimum_norm, qd=qd)
-    own, motion = formulation.conditions(q[0], q[-1], apart=False), formulation.sampled(samples)
-    return penalised(formulation.cost_of(motion), motion.with_conditions(own.every))
+    own, motion = formulation.conditions(q[0], q[-1], apart=False), sampled(formulation, samples)
+    return penalised(cost_of_motion(formulation, motion), motion.with_conditions(own.every))

@@ -5,7 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.planning.formulation import require_finite_gradients, require_finite_values
+from selfmotion.planning.formulation import (
+    keeps_off_itself,
+    require_finite_gradients,
+    require_finite_values,
+)
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import is_on_nodes, uses_published_method
 from selfmotion.planning.planner.guess import Guess
@@ -88,7 +92,7 @@ def kept_off_itself(solution: Solution) -> Solution | None:
     if not isinstance(outcome, NodeOutcome) or outcome.violations or outcome.is_chain:
         return None
     # Of a given start in which it meets itself, nothing else begins.
-    can = guess.free or guess.formulation.keeps_off_itself(outcome.motion.place.q[:1])
+    can = guess.free or keeps_off_itself(guess.formulation, outcome.motion.place.q[:1])
     if solution.ended is not None or guess.effort.apart or not can:
         return None
     apart = guess.kept_apart()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, Ints, ProblemError, nearest, shown
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Follows, completed
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import SwivelAngle, null_space
 from selfmotion.model.task import Task
@@ -158,7 +158,7 @@ def coordinates_of(
 def _along(formulation: Formulation, motion: Trajectory) -> tuple[Array, Array]:
     """Return a few times (K,) of a motion, and all coordinates then, (K, n)."""
     times = np.linspace(float(motion.t[0]), float(motion.t[-1]), _FEW_TIMES)
-    return times, formulation.completed(times, motion(times))
+    return times, completed(formulation.follows, times, motion(times))
 
 
 def _named(formulation: Formulation, z: Array, chosen: str) -> Axis:

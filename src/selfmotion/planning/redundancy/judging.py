@@ -10,7 +10,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.motion import Sampling
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import Formulation, sampled
 from selfmotion.problem.costs import Cost, LostCost, Samples
 
 # Rounding of limits [rad or m, per s]: a motion that stands at one is not beyond it.
@@ -131,7 +131,7 @@ class LocalMotion:
         Of costs of q and q̇: those of accelerations and jerks are left out. NaN where one cannot be
         evaluated, as functions that no file has.
         """
-        arm = self.formulation.sampled(replace(self._at_rest, qd=self.rates)).arm
+        arm = sampled(self.formulation, replace(self._at_rest, qd=self.rates)).arm
         total = np.zeros(len(self.z))
         for cost in self.formulation.costs:
             if isinstance(cost, LostCost):

@@ -22,6 +22,7 @@ from selfmotion.basics import (
     silent,
     write_archive,
 )
+from selfmotion.model.follow import chain_tables, completed
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.redundancy.axis import Axis, axis_of
@@ -238,7 +239,7 @@ def redundancy_map_of(
     """
     columns, rows = _shape(shape)
     times = np.linspace(float(motion.t[0]), float(motion.t[-1]), columns)
-    z = formulation.completed(times, motion(times))
+    z = completed(formulation.follows, times, motion(times))
     axis = axis_of(formulation, motion, coordinate, active)
     line = _line(formulation, axis, motion, times)
     start = _line(formulation, axis, initial, times)
@@ -310,7 +311,7 @@ def _line(formulation: Formulation, axis: Axis, motion: Trajectory, times: Array
         return line
     fine = np.interp(np.arange(_BETWEEN * (len(few) - 1) + 1) / _BETWEEN, np.arange(len(few)), few)
     fine = np.minimum(fine, motion.t[-1])
-    z = formulation.completed(fine, motion(fine))
+    z = completed(formulation.follows, fine, motion(fine))
     line[inside] = axis.along(formulation.follows, fine, z)[::_BETWEEN]
     return line
 
@@ -334,7 +335,7 @@ def _continued(
         np.ascontiguousarray(start[on]),
         np.ascontiguousarray(first[on] / axis.size),
         np.ascontiguousarray(targets[on]),
-        follows.chains,
+        chain_tables(follows),
         follows.layout,
         axis.code,
         axis.reference,

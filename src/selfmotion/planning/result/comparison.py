@@ -166,17 +166,17 @@ def _common_costs(
 
 def _own_costs(plans: Sequence[Plan]) -> dict[str, tuple[float | None, ...]]:
     """Return the values of each plan's own costs, and the sums if these are the same."""
-    asked = [{cost.name: cost for cost in plan.problem.costs} for plan in plans]
+    by_plan = [{cost.name: cost for cost in plan.problem.costs} for plan in plans]
     found: dict[str, tuple[float | None, ...]] = {}
     for term in dict.fromkeys(term for plan in plans for term in plan.report.terms):
-        given = [costs[term] for costs in asked if term in costs]
+        given = [costs[term] for costs in by_plan if term in costs]
         alike = all(_is_same(given[0], other) for other in given[1:])
         label = term if alike else f"{term} (each plan's own)"
         found[label] = tuple(plan.report.terms.get(term) for plan in plans)
-    first = asked[0]
+    first = by_plan[0]
     if all(
         costs.keys() == first.keys() and all(_is_same(first[name], costs[name]) for name in first)
-        for costs in asked[1:]
+        for costs in by_plan[1:]
     ):
         found[_TOTAL] = tuple(None if plan.report.ending else plan.report.cost for plan in plans)
     return found

@@ -41,6 +41,7 @@ from selfmotion.planning.result.specification import (
 from selfmotion.problem.problem import (
     START_TOLERANCE,
     Problem,
+    along_other_paths,
     at_all_times,
     constraints_of_part,
     problem_from_dict,
@@ -362,7 +363,7 @@ class PartsAsked:
                 yield f"it is not the path from {ends[0]:.6g} to {ends[1]:.6g} s"
                 return
             if isinstance(path, Retimed):
-                moved = problem.along(lambda _: path, times_along(path, ends))
+                moved = along_other_paths(problem, lambda _: path, times_along(path, ends))
                 relaxed = moved["relaxations"]
             else:
                 relaxed = tuple(problem.relaxations)
@@ -371,7 +372,7 @@ class PartsAsked:
             path, relaxed = problem.path, tuple(problem.relaxations)
             constraints = tuple(problem.constraints)
         wanted = (*constraints, *problem.clearances)
-        asked = MotionSpecification(
+        required = MotionSpecification(
             problem.robot,
             path,
             problem.task,
@@ -381,7 +382,7 @@ class PartsAsked:
             also=problem.also,
             rest=problem.rest and problem.damping is None,
         )
-        yield from asked.failures(plan)
+        yield from required.failures(plan)
         start = problem.given_start
         if is_first and start is not None:
             # The correction of a start given near the path.
@@ -396,8 +397,8 @@ class PartsAsked:
         if len(moves) != wanted:
             yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"
             return
-        asked = (*at_all_times(problem.constraints), *problem.clearances)
-        kept = [item for item in asked if item.applies(problem.robot)]
+        required = (*at_all_times(problem.constraints), *problem.clearances)
+        kept = [item for item in required if item.applies(problem.robot)]
         for number, move in enumerate(moves, 1):
             for text in another_tool(move.robot, problem.robot):
                 yield f"move {number}: {text}"

@@ -143,36 +143,7 @@ class Plan:
         check, motion = self.certificate, self.trajectory
         if (check.motion, check.problem) != (motion.digest, self.problem.digest):
             object.__setattr__(self, "certificate", check.of_another())
-        object.__setattr__(self, "report", self._own_report())
-
-    def _own_report(self) -> Report:
-        """Return the report of this motion and these costs: that of others is evaluated again.
-
-        If it does not name its motion, it is of the certificate's. Costs that cannot be evaluated,
-        as functions that no file has, are NaN.
-        """
-        motion, initial = self.trajectory.digest, self.initial_trajectory.digest
-        costs, report = _digests(self.problem.costs), self.report
-        if not report.motion and self.certificate.motion:
-            return replace(report, motion=motion, initial_motion=initial, costs=costs)
-        same_costs = _are_same(costs, report.costs)
-        # Files of older versions do not name the minimum-norm motion: the one in it.
-        if not (same_costs and report.initial_motion in ("", initial)):
-            total, terms = self._costs_of(self.initial_trajectory)
-            report = replace(report, initial_cost=total, initial_terms=terms)
-        if not (same_costs and report.motion == motion):
-            report = report.evaluated(*self._costs_of(self.trajectory))
-        return replace(report, motion=motion, initial_motion=initial, costs=costs)
-
-    def _costs_of(self, motion: Trajectory) -> tuple[float, Mapping[str, float]]:
-        """Return the cost of a motion, and the terms; NaN where one cannot be evaluated."""
-        terms = {}
-        for cost in self.problem.costs:
-            with suppress(ProblemError):
-                if not isinstance(cost, LostCost):
-                    terms[cost.name] = cost_of(self.problem.follows, motion, cost)
-        complete = len(terms) == len(self.problem.costs)
-        return (sum(terms.values()) if complete else math.nan), terms
+        object.__setattr__(self, "report", _own_report(self))
 
     def __repr__(self) -> str:
         """Return a few lines: arm, cost, and the verdict."""
@@ -431,6 +402,37 @@ class Plan:
     def _repr_html_(self) -> str | None:
         """Show the replay inline in a notebook."""
         return None if self.views is None else self.views.notebook_html(self)
+
+
+def _own_report(plan: Plan) -> Report:
+    """Return the report of this motion and these costs: that of others is evaluated again.
+
+    If it does not name its motion, it is of the certificate's. Costs that cannot be evaluated,
+    as functions that no file has, are NaN.
+    """
+    motion, initial = plan.trajectory.digest, plan.initial_trajectory.digest
+    costs, report = _digests(plan.problem.costs), plan.report
+    if not report.motion and plan.certificate.motion:
+        return replace(report, motion=motion, initial_motion=initial, costs=costs)
+    same_costs = _are_same(costs, report.costs)
+    # Files of older versions do not name the minimum-norm motion: the one in it.
+    if not (same_costs and report.initial_motion in ("", initial)):
+        total, terms = _costs_of(plan, plan.initial_trajectory)
+        report = replace(report, initial_cost=total, initial_terms=terms)
+    if not (same_costs and report.motion == motion):
+        report = report.evaluated(*_costs_of(plan, plan.trajectory))
+    return replace(report, motion=motion, initial_motion=initial, costs=costs)
+
+
+def _costs_of(plan: Plan, motion: Trajectory) -> tuple[float, Mapping[str, float]]:
+    """Return the cost of a motion, and the terms; NaN where one cannot be evaluated."""
+    terms = {}
+    for cost in plan.problem.costs:
+        with suppress(ProblemError):
+            if not isinstance(cost, LostCost):
+                terms[cost.name] = cost_of(plan.problem.follows, motion, cost)
+    complete = len(terms) == len(plan.problem.costs)
+    return (sum(terms.values()) if complete else math.nan), terms
 
 
 def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:

@@ -33,7 +33,7 @@ from selfmotion.problem.constraints import (
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, along_other_paths
 
 # Times between two samples of the new motion [s]: the first one within the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
@@ -264,9 +264,9 @@ def rate_limits(
     ProblemError
         One is not positive, or no joint's acceleration is limited.
     """
-    robot, asked = problem.robot, problem.envelope
-    v = asked.speed if velocity is None else velocity
-    a = asked.acceleration if acceleration is None else acceleration
+    robot, limits = problem.robot, problem.envelope
+    v = limits.speed if velocity is None else velocity
+    a = limits.acceleration if acceleration is None else acceleration
     v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
     a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
     if not np.all(np.isfinite(a)):
@@ -275,7 +275,7 @@ def rate_limits(
             f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
             f"no pace is the fastest; give acceleration="
         )
-    return read_only(np.minimum(v, asked.speed)), read_only(np.minimum(a, asked.acceleration))
+    return read_only(np.minimum(v, limits.speed)), read_only(np.minimum(a, limits.acceleration))
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
@@ -294,14 +294,15 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         return np.where(times <= 0.0, 0.0, late)
 
     # A plan of a part has no conditions on the end.
-    asked = [item for item in old.constraints if not (plan.report.ending and item.ends.is_about(1))]
+    kept = [item for item in old.constraints if not (plan.report.ending and item.ends.is_about(1))]
     problem = replace(
         old,
-        **old.along(
+        **along_other_paths(
+            old,
             lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend),
             passed,
         ),
-        constraints=(*asked, *wanted),
+        constraints=(*kept, *wanted),
     )
     # Of the tool's motion at any pace the same joint path is of minimum norm.
     is_whole = plan.initial_trajectory.duration == plan.trajectory.duration

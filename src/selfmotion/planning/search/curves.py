@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints, Progress, inlined, kernel, read_only, silent
 from selfmotion.basics.layout import Layout
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Follows, kinematics_of
 from selfmotion.model.kernels import rows_of
 from selfmotion.model.robot import place_tips
 from selfmotion.planning.search.manifold import (
@@ -324,7 +324,7 @@ class SelfMotion:
     def __init__(self, follows: Follows, spacing: float) -> None:
         self.robot, self.coordinates, self.spacing = follows.robot, follows.coordinates, spacing
         self.revolute = follows.coordinates.is_revolute
-        self._tips = follows.kinematics()
+        self._tips = kinematics_of(follows)
         everywhere = np.full(follows.dof, np.inf)
         self._manifold = Manifold(follows, -everywhere, everywhere)
         # Any direction that is not a row of the Jacobian gives the tangent by projection.

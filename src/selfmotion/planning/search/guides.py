@@ -6,6 +6,7 @@ from collections import abc
 import numpy as np
 
 from selfmotion.basics import Array, Progress
+from selfmotion.model.follow import has_windows
 from selfmotion.model.path import Path, spread_along
 from selfmotion.model.task import log3
 from selfmotion.planning.formulation import Formulation
@@ -129,7 +130,7 @@ def asks_length(formulation: Formulation) -> bool:
 
 def has_curves(formulation: Formulation) -> bool:
     """Whether the self-motions of a problem are curves, at all times."""
-    return formulation.follows.redundancy == 1 and not formulation.follows.holds
+    return formulation.follows.redundancy == 1 and not has_windows(formulation.follows)
 
 
 def waypoint_times(formulation: Formulation) -> Array:

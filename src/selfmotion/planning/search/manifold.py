@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, RobotError, called, inlined, kernel
 from selfmotion.basics.layout import Layout
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Follows, band_limits, chain_tables, linear_rows
 from selfmotion.model.kernels import (
     carried,
     cholesky,
@@ -235,7 +235,7 @@ class Manifold:
     ----------
     revolute : (n,)
     chains : (F, c + 1, 6, 3)
-        See `Follows.chains`.
+        See `chain_tables`.
     layout : (1, 9 + n)
         See `Follows.layout`.
 
@@ -250,7 +250,7 @@ class Manifold:
         # Copies: kernels would be compiled again for read-only arrays.
         self._limits = np.array(lower), np.array(upper)
         self._limited = np.isfinite(upper)
-        self.chains = follows.chains
+        self.chains = chain_tables(follows)
         self.revolute: Flags = follows.coordinates.is_revolute
         self.layout = follows.layout
         self._check()
@@ -282,7 +282,7 @@ class Manifold:
                 q[alone], wanted[alone], locked[alone], _FAR_STEPS
             )
         # Joints that share a band may be within their limits, and beyond that together.
-        within = np.where(self._limited, self.follows.within_bands(found), np.inf)
+        within = np.where(self._limited, band_limits(self.follows, found), np.inf)
         beyond = arrived & (np.abs(found) > within).any(axis=1)
         if beyond.any():
             given = found[beyond], wanted[beyond], locked[beyond], _FAR_STEPS, within[beyond]
@@ -304,7 +304,7 @@ class Manifold:
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
         limits = *self._limits, np.array(held)
         approach_all(found, target, self.chains, self.layout, *limits, _FAR_STEPS, left)
-        linear = self.follows.linear > 0.0
+        linear = linear_rows(self.follows) > 0.0
         parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
         errors = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
         return found, np.stack(errors, axis=1)

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
 
 import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import Closest, how_near
-from selfmotion.model.follow import RelaxedFrames
+from selfmotion.model.follow import deviation_of, limits_within, tip_names
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.planning.formulation import Formulation
@@ -114,7 +113,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         if not set(item.rows) <= set(rows)
     )
     wider, n = poses.of(replace(problem, relaxations=(*others, more))), problem.robot.dof
-    follows = cast(RelaxedFrames, wider.formulation.follows)
+    follows = wider.formulation.follows
     q = poses.some(t, CLIMBERS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.dof - n))])
     best: Array | None = None
@@ -124,14 +123,14 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         q = q[wider.bounds.keep(q)]
         if not len(q):
             break
-        away = follows.deviation(more, q)
+        away = deviation_of(follows, more, q)
         sizes = np.linalg.norm(away, axis=1)
         order = np.argsort(sizes)
         q, size = q[order], float(sizes[order[0]])
         if best is None or size < np.linalg.norm(best):
             best = np.zeros(6)
             best[more.indices] = away[order[0]]
-        limits = follows.limits_within(more, _SHRUNK * size)
+        limits = limits_within(follows, more, _SHRUNK * size)
         if not limits.max() > 0.0:
             break
         wider = wider.with_limits(
@@ -385,7 +384,7 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     """
     begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
     if len(poses.problem.follows.items) > 1:
-        names = poses.follows.names
+        names = tip_names(poses.follows)
         return f"{begin}: no configuration was found that puts {names} on their paths"
     rounds = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
     errors = [(*poses.nearest(float(t))[1][0], float(t)) for t in rounds]

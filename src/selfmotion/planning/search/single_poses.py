@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.model.collision import Closest
+from selfmotion.model.follow import band_limits, within_limits
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
@@ -78,7 +79,7 @@ class SinglePoses:
     ) -> None:
         required = formulation.envelope_without_arm
         self.formulation, self._rng, self._clear = formulation, rng, clear
-        self.follows = formulation.follows.within(required.lower, required.upper)
+        self.follows = within_limits(formulation.follows, required.lower, required.upper)
         self.coordinates = self.follows.coordinates
         self._manifold = Manifold(self.follows, required.lower, required.upper)
         self.bounds = Admissible(
@@ -153,7 +154,7 @@ class SinglePoses:
         """Return solutions of the damped method, which also reaches limits and edges, (K, n)."""
         q, errors = self.nearest(t, count)
         near = q[errors.sum(axis=1) < _NEARLY]
-        within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
+        within = (np.abs(near) <= band_limits(self.follows, near)).all(axis=1)
         pulled, arrived = self.project(near[~within], t)
         return np.concatenate([near[within], pulled[arrived]])
 
@@ -210,7 +211,7 @@ def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
 
 
 def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
-    """Return samples of all poses-motions of a pose, where these are curves, (K, n).
+    """Return samples of all self-motions of a pose, where these are curves, (K, n).
 
     Those within the limits: the curves go on beyond them.
     """
@@ -222,13 +223,13 @@ def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
     samples = [curve.q for curve in motion.curves(target, seeds).curves]
     every = np.concatenate([np.empty((0, poses.coordinates.dof)), *samples])
     q = poses.bounds.representative(every)
-    most = poses.follows.within_bands(q)
+    most = band_limits(poses.follows, q)
     lower, upper = np.maximum(poses.bounds.lower, -most), np.minimum(poses.bounds.upper, most)
     return np.asarray(q[((q >= lower) & (q <= upper)).all(axis=1)])
 
 
 def _wandered(poses: SinglePoses, t: float, met: Array) -> Array:
-    """Return configurations that random walks along the poses-motions lead to, (K, n).
+    """Return configurations that random walks along the self-motions lead to, (K, n).
 
     From anywhere Newton's method may lead to few of them only, where limits are near.
     """

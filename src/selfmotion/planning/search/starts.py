@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, InverseKinematicsError
-from selfmotion.model.follow import Coordinates, Follows
+from selfmotion.model.follow import Coordinates, Follows, has_windows, is_plain, only_tip, tip_names
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
@@ -65,7 +65,7 @@ def start_candidates(
         No seed led to the pose.
     """
     found: list[Array] = []
-    if follows.redundancy == 1 and not follows.holds:
+    if follows.redundancy == 1 and not has_windows(follows):
         found = _along_curves(follows, count, rng, admits or _all, time)
     if not found:
         found = _scattered(follows, count, rng, admits or _all, time)
@@ -73,17 +73,21 @@ def start_candidates(
         found = _approached(follows, count, rng, admits or _all, time)
     if not found and admits is not None:
         return start_candidates(follows, count, rng, None, time)
-    if not found and not follows.is_plain:
+    if not found and not is_plain(follows):
         raise InverseKinematicsError(
             f"{follows.robot.name}: no configuration within the limits was found that puts "
-            f"{follows.names} on the start of the path; move that into the workspace, or give one "
-            f"(start=)",
+            f"{tip_names(follows)} on the start of the path; move that into the workspace, or give "
+            f"one (start=)",
             position_miss=np.inf,
             rotation_miss=np.inf,
         )
     if not found:
         # Many more attempts, and an error that names the distance.
-        found = [follows.robot.inverse_kinematics(follows.path.pose(time), follows.task, rng=rng)]
+        found = [
+            follows.robot.inverse_kinematics(
+                only_tip(follows).path.pose(time), only_tip(follows).task, rng=rng
+            )
+        ]
     return found
 
 

@@ -64,7 +64,7 @@ class Room:
 
     Attributes
     ----------
-    asked : Envelope
+    envelope : Envelope
         Limits, bodies and quantities.
     robot : RobotModel
     margin : float

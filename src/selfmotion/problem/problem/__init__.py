@@ -27,6 +27,7 @@ from selfmotion.problem.problem.fit import (
 from selfmotion.problem.problem.paper_problem import sample_problem as sample_problem
 from selfmotion.problem.problem.problem import (
     Problem as Problem,
+    along_other_paths as along_other_paths,
     check_feeds_of as check_feeds_of,
     check_problem as check_problem,
 )

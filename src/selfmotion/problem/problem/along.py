@@ -122,11 +122,11 @@ def envelope_without_arm(robot: RobotModel, constraints: Sequence[Constraint]) -
 
 
 def with_own_limits(
-    robot: RobotModel, requirements: Sequence[Requirement], asked: Envelope
+    robot: RobotModel, requirements: Sequence[Requirement], given: Envelope
 ) -> Envelope:
     """Return an envelope with the arm's own limits where the certificate judges these."""
     own = (Envelope.of_limits(item) for item in arm_limits(robot, requirements))
-    return reduce(and_, own, asked)
+    return reduce(and_, own, given)
 
 
 def given_end(robot: RobotModel, constraints: Sequence[Constraint]) -> Array | None:

@@ -17,7 +17,13 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.certificate import Requirement, errors_at
-from selfmotion.model.follow import Follow, Follows, RelaxedFrames, VirtualJoints
+from selfmotion.model.follow import (
+    Follow,
+    Follows,
+    VirtualJoints,
+    row_names_of,
+    with_tolerances,
+)
 from selfmotion.model.motion import FreeNullMotion, NullMotion
 from selfmotion.model.path import FeedPossible, Path, check_oriented, spread_along
 from selfmotion.model.robot import Chain, RobotModel
@@ -109,10 +115,10 @@ def _beyond(robot: RobotModel, start: Array) -> str:
     for k, name in enumerate(robot.joint_names):
         low, high = robot.lower[k], robot.upper[k]
         if not low <= start[k] <= high:
-            unit, asked = ("m", "") if robot.is_prismatic(name) else ("rad", "; in degrees?")
+            unit, hint = ("m", "") if robot.is_prismatic(name) else ("rad", "; in degrees?")
             return (
                 f"has joint '{name}' at {start[k]:g} {unit}, beyond its limits of {low:.4g} to "
-                f"{high:.4g} {unit}{asked}, and "
+                f"{high:.4g} {unit}{hint}, and "
             )
     return ""
 
@@ -382,7 +388,7 @@ def _can_with(follows: Follows, relaxations: Sequence[Relaxation]) -> bool:
     item = follows.items[0]
     if item.task is Task.PLANAR_POSE and not _moves_in_plane(follows.robot, item.chain):
         return False
-    whole = RelaxedFrames.with_tolerances(follows, relaxations)
+    whole = with_tolerances(follows, relaxations)
     return whole.dof - whole.redundancy >= whole.dimension
 
 
@@ -397,10 +403,10 @@ def _check_several(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
                 f"which '{item.chain.tip_name}' does not; choose another one (Follow(task=))"
             )
     if robot.dof - left < rows and not _can_with(follows, relaxations):
+        names = ", ".join(row_names_of(follows))
         raise ProblemError(
-            f"{robot.name}: {what} have {rows} rows prescribed ({', '.join(follows.row_names)}), "
-            f"but {robot.dof} joints cannot move them freely in all of these; prescribe fewer "
-            f"(Follow(task=))"
+            f"{robot.name}: {what} have {rows} rows prescribed ({names}), but {robot.dof} joints "
+            f"cannot move them freely in all of these; prescribe fewer (Follow(task=))"
         )
     if left == 0 and not is_relaxed:
         raise RedundancyError(

@@ -209,7 +209,7 @@ class Problem:
     def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
         # Derived values are computed anew: placed bodies belong to a thread. The default clearance
         # and limits are identified by object identity.
-        kept = {name: item for name, item in self.__dict__.items() if name not in self._derived}
+        kept = {name: item for name, item in self.__dict__.items() if name not in _derived(self)}
         usual = [
             next((k for k, each in enumerate(KEPT) if each is item), -1)
             for item in self.constraints
@@ -225,14 +225,6 @@ class Problem:
         items = (KEPT[k] if k >= 0 else item for item, k in pairs)
         object.__setattr__(self, "constraints", tuple(items))
 
-    @property
-    def _derived(self) -> set[str]:
-        """Names of cached derived values."""
-        several = (vars(cls).items() for cls in type(self).__mro__)
-        return {
-            name for each in several for name, item in each if isinstance(item, cached_property)
-        }
-
     @cached_property
     def follows(self) -> Follows:
         """Task frames of the arm: the input of planners."""
@@ -241,24 +233,6 @@ class Problem:
     def changed(self, **changes: Any) -> Problem:
         """Return the problem with other parameters."""
         return replace(self, **changes)
-
-    def along(
-        self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
-    ) -> dict[str, Any]:
-        """Return, for `dataclasses.replace`, other paths in place of all that are followed.
-
-        With `when`, also the windows of tolerances at other times; those that become empty are
-        left out.
-        """
-        others = tuple(
-            item.along(other(bound.path))
-            for item, bound in zip(self.also, self.follows.items[1:], strict=True)
-        )
-        found: dict[str, Any] = {"path": other(self.path), "also": others}
-        if when is not None:
-            moved = (item.moved(when) for item in self.relaxations)
-            found["relaxations"] = tuple(item for item in moved if item is not None)
-        return found
 
     @property
     def given_start(self) -> Array | None:
@@ -272,8 +246,8 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        asked = self.envelope
-        limits = BeyondLimits(_BEYOND_LIMITS, asked.lower, asked.upper, asked.speed)
+        kept = self.envelope
+        limits = BeyondLimits(_BEYOND_LIMITS, kept.lower, kept.upper, kept.speed)
         return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
     @property
@@ -292,12 +266,6 @@ class Problem:
         """Orders of rest of the arm at the start and at the end; see `rest_orders`."""
         return arm_rest_orders(self.follows, self.constraints) if self.rest else (0, 0)
 
-    @property
-    def rests(self) -> tuple[bool, bool]:
-        """Whether the arm has to be at rest at the start and at the end."""
-        start, end = self.rest_orders
-        return start > 0, end > 0
-
     @cached_property
     def damping_law(self) -> DampingLaw | None:
         """The damping in numbers [m, rad] for this arm and task."""
@@ -309,18 +277,11 @@ class Problem:
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
         """Requirements of the certificate besides the path: rest, and one for each constraint."""
-        return (*self._rest(*self.rest_orders), *self._judging)
+        return (*_rest(self, *self.rest_orders), *self._judging)
 
     @cached_property
     def _judging(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
-
-    def _rest(self, start: int, end: int) -> tuple[Requirement, ...]:
-        """Return the requirements of rest of given orders; see `rest_orders`."""
-        # A damped motion off its path is still moving.
-        if self.damping is not None or not (start or end):
-            return ()
-        return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
 
     @cached_property
     def envelope_without_arm(self) -> Envelope:
@@ -354,7 +315,7 @@ class Problem:
         stops before the end of the path, and need not rest there.
         """
         start, end = self.rest_orders
-        rests = self._rest(start, 0 if ending else end)
+        rests = _rest(self, start, 0 if ending else end)
         certificate = certify(
             self.robot,
             self.path,
@@ -379,6 +340,39 @@ class Problem:
     def digest(self) -> str:
         """Identifier of the certificate's conditions; see `conditions_digest`."""
         return conditions_digest(self)
+
+
+def along_other_paths(
+    problem: Problem, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
+) -> dict[str, Any]:
+    """Return, for `dataclasses.replace`, other paths in place of all that are followed.
+
+    With `when`, also the windows of tolerances at other times; those that become empty are
+    left out.
+    """
+    others = tuple(
+        item.along(other(bound.path))
+        for item, bound in zip(problem.also, problem.follows.items[1:], strict=True)
+    )
+    found: dict[str, Any] = {"path": other(problem.path), "also": others}
+    if when is not None:
+        moved = (item.moved(when) for item in problem.relaxations)
+        found["relaxations"] = tuple(item for item in moved if item is not None)
+    return found
+
+
+def _derived(problem: Problem) -> set[str]:
+    """Names of cached derived values."""
+    several = (vars(cls).items() for cls in type(problem).__mro__)
+    return {name for each in several for name, item in each if isinstance(item, cached_property)}
+
+
+def _rest(problem: Problem, start: int, end: int) -> tuple[Requirement, ...]:
+    """Return the requirements of rest of given orders; see `rest_orders`."""
+    # A damped motion off its path is still moving.
+    if problem.damping is not None or not (start or end):
+        return ()
+    return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
 
 
 # Signature in help() of a field that is a descriptor.

@@ -5,6 +5,7 @@ from selfmotion.shell.cli import (
     exports as exports,
     jobs as jobs,
     margins as margins,
+    places as places,
     runs as runs,
     viewing as viewing,
 )

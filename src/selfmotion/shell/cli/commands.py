@@ -10,7 +10,16 @@ import typer
 
 import selfmotion as sm
 from selfmotion.basics import held_interruption, write_text
-from selfmotion.shell.cli import checks, documents, jobs, options, outputs, summaries, tables
+from selfmotion.shell.cli import (
+    checks,
+    documents,
+    jobs,
+    judging,
+    options,
+    outputs,
+    summaries,
+    tables,
+)
 from selfmotion.shell.cli.app import (
     FILES,
     LOOK,
@@ -26,7 +35,6 @@ from selfmotion.shell.cli.app import (
     terminal,
 )
 from selfmotion.shell.documents import MAYBE, example_texts, json_schema
-from selfmotion.shop import controllers
 
 
 @app.command(
@@ -177,86 +185,24 @@ def check(
 
     One made elsewhere by what plan keeps: limits of the arm and of its maker, and self-collision.
     """
-    judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf, disabled
-    within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
-    path = context.params["path"]
-    typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
-    typed["flip_normals"] = typed["flip_normals"] or None
-    own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
-    own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
-    own |= {"argument": argument or None, "packages": packages or None}
-    own |= {"no-self-collision": no_collision or None}
-    measured = {"calibration": calibration}
-    if file.suffix in (jobs.PROGRAM, jobs.PARTS):
-        given = (
-            own | measured | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
-        )
-        whose = "the program's" if file.suffix == jobs.PROGRAM else "the parts'"
-        options.refuse(given | {"limits": any(judged) or None}, file, whose)
+    # With their types, those of the signature; options of the path are the context's alone.
+    asked = judging.Asked(file, context.params | locals())
+    asked.refuse_others()
+    if asked.is_job:
         jobs.check(file, as_json, verbose)
-    if robot is not None and Path(robot).suffix == jobs.PROGRAM:
-        options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
-        options.refuse({"limits": any(judged) or None}, robot, "the program's")
-        checks.of_program(file, Path(robot), within, as_json, verbose)
-    program, notes = None, list[str]()
+    if asked.is_of_program:
+        checks.of_program(file, Path(robot or ""), asked.within, as_json, verbose)
     with StageDisplay(stages) as display:
-        if file.suffix == ".npz":
-            options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
-            certificate, near, arm = checks.of_plan(
-                file, within, judged, display.stage, calibration
-            )
-        elif robot is not None and Path(robot).suffix in (".npz", *documents.SUFFIXES):
-            whose = "the plan's" if Path(robot).suffix == ".npz" else "the problem's"
-            options.refuse(own, robot, whose)
-            certificate, near, arm, program = checks.of_problem(
-                file, robot, degrees, within, judged, display.stage, calibration
-            )
-            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
-        else:
-            if robot is None or path is None:
-                raise sm.errors.ProblemError(
-                    f"{file}: a motion is checked against a robot and a path: give --robot and "
-                    f"--path, or a problem file or a plan (.npz) as --robot (a job's .program "
-                    f"for its program)"
-                )
-            held = options.locks(lock)
-            arm = sm.load_robot(
-                robot,
-                tool=tool,
-                lock=held,
-                reference=reference,
-                arguments=options.arguments(argument),
-                packages=packages or (),
-                calibration=calibration,
-            )
-            found = checks.read(file, degrees, within, arm)
-            program = found.program
-            # Accelerations of a program are the controller's.
-            asked = checks.requirements(arm, *judged, usual=program is None, apart=not no_collision)
-            followed = documents.followed(path, context.params, arm)
-            stated = found.within
-
-            def certify(motion: sm.Trajectory) -> sm.Certificate:
-                return sm.certify(
-                    arm, followed, task or "pose", motion, stated, asked, progress=display.stage
-                )
-
-            certificate, motion = controllers.judged_interpolations(
-                found.ways(followed, arm), certify
-            )
-            certificate = checks.with_failures(certificate, found.besides(arm, ()))
-            near = checks.near(arm, motion, asked)
-            notes += checks.notes_of(file, degrees, arm, joint_limits, obstacles, srdf)
-            notes += [*arm.urdf.notes, *followed.notes]
-    outputs.print_notes(notes)
+        found = asked.judged(display.stage)
+    outputs.print_notes(found.notes)
     if as_json:
-        data = summaries.certificate_json(certificate, near)
-        data["remarks"] = [*notes, *data["remarks"]]
-        print_json(data | checks.left_to_controller(program))
+        data = summaries.certificate_json(found.certificate, found.near)
+        data["remarks"] = [*found.notes, *data["remarks"]]
+        print_json(data | checks.left_to_controller(found.program))
     else:
-        outputs.show_certificate(certificate, near, arm, verbose)
-        checks.print_controller_note(program)
-    raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+        outputs.show_certificate(found.certificate, found.near, found.arm, verbose)
+        checks.print_controller_note(found.program)
+    raise typer.Exit(VERIFIED if found.certificate.verified else NOT_VERIFIED)
 
 
 @app.command(epilog="Example: selfmotion compare a.npz b.npz", rich_help_panel=LOOK)

@@ -70,25 +70,16 @@ def export(
     asked = outputs.program_settings(settings, targets, wobj, mass)
     files = _Files(tuple(out), form, asked, parts, force, verbose or as_json)
     files.check(rate, settings, {"targets": targets, "wobj": wobj, "mass": mass})
-    made = _loaded(file)
-    if parts and not isinstance(made, sm.Plan):
-        raise sm.errors.ProblemError(
-            f"{file}: --parts is of a cell's plan, which this is not; leave it out"
-        )
+    made = _loaded(file, parts=parts)
     _check_verified(made, force, as_json)
     _print_followers(made.robot, out, form)
     outputs.print_base(made.robot, asked)
     if isinstance(made, sm.Plan) and files.are_readable:
         made = _slow_enough(made, rate)
-    coarsest = None
-    if rate is None and files.are_messages and isinstance(made, sm.Plan):
-        coarsest = controllers.coarsest_rate(made)
-    verdicts: dict[str, str] = {}
-    sound = True
-    for target in out:
-        kept, written = files.write(made, target, rate, coarsest)
-        verdicts |= written
-        sound &= kept
+    coarsest = _coarsest(files, made, rate)
+    each = [files.write(made, target, rate, coarsest) for target in out]
+    sound = all(kept for kept, _ in each)
+    verdicts = {name: text for _, written in each for name, text in written.items()}
     streamed = [target for target in out if not files.is_program(target)]
     if all(reread.is_message(target, form) for target in streamed):
         rate = coarsest if rate is None else rate
@@ -98,8 +89,24 @@ def export(
     _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
 
 
-def _loaded(file: Path) -> reread.Made:
-    """Return what a file holds: a program, parts, a move or a plan."""
+def _coarsest(files: "_Files", made: reread.Made, rate: float | None) -> float | None:
+    """Return the rate of messages that keeps a plan, where none is asked for; else None."""
+    if rate is None and files.are_messages and isinstance(made, sm.Plan):
+        return controllers.coarsest_rate(made)
+    return None
+
+
+def _loaded(file: Path, *, parts: bool) -> reread.Made:
+    """Return what a file holds: a program, parts, a move or a plan, the one that has `parts`."""
+    made = _read(file)
+    if parts and not isinstance(made, sm.Plan):
+        raise sm.errors.ProblemError(
+            f"{file}: --parts is of a cell's plan, which this is not; leave it out"
+        )
+    return made
+
+
+def _read(file: Path) -> reread.Made:
     if file.suffix == jobs.PROGRAM:
         return sm.load_program(file)
     if file.suffix == jobs.PARTS:

@@ -29,6 +29,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
+from selfmotion.shell.documents import SeamJob
 from selfmotion.shop import controllers
 
 # Suffix of a saved program.
@@ -82,52 +83,78 @@ def job(
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan many seams as one program: order, directions, and the moves in between."""
-    from selfmotion.work.batch import processes
-
     wanted = [*(out or []), *([] if html is None else [html])]
-    for target in wanted:
-        _check(target)
+    _check_wanted(wanted, settings)
     check_cluster(dask, workers if workers > 1 else None)
-    if settings is not None and not any(_switches(target) for target in wanted):
-        raise sm.errors.ProblemError(
-            "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
-        )
     # Ctrl-C while kernels are loaded is lost, unless it is noted.
     with basics.held_interruption():
         work = documents.seams_of_file(file, changes or [], allow_code)
         earlier = None if before is None else sm.load_program(before)
         asked = None if settings is None else sm.files.read_program_settings(settings)
-        if asked is not None or any(_switches(target) for target in wanted):
-            # Before anything is planned.
-            happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
-            controllers.check_signals(happens, asked or sm.files.ProgramSettings())
-            for target in wanted:
-                if target.suffix.lower() in controllers.PROGRAMS:
-                    form = controllers.PROGRAMS[target.suffix.lower()]
-                    controllers.check_controller(
-                        work.robot, form, asked or sm.files.ProgramSettings()
-                    )
+        # Before anything is planned.
+        _check_programs(work, wanted, asked)
         remarks = work.remarks
     outputs.print_notes(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
+    program = _planned(work, kept, dask, workers, warm_start=earlier, deadline=deadline)
+    if work.at_feed is not None and not as_json:
+        _print_feed(program)
+    _show(program, as_json, verbose, remarks)
+    _write_wanted(program, wanted, asked, as_json)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+
+
+def _planned(work: SeamJob, kept: Path, dask: str | None, workers: int, **given: Any) -> sm.Program:
+    """Return the program of a job, on a cluster or in processes; what is finished is `kept`."""
+    from selfmotion.work.batch import processes
+
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
         with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
-            program = work.plan(
-                folder=kept,
-                executor=cluster or pool,
-                warm_start=earlier,
-                deadline=deadline,
-                progress=display.stage,
-            )
+            return work.plan(folder=kept, executor=cluster or pool, progress=display.stage, **given)
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
-    if work.at_feed is not None and not as_json:
-        feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
-        text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
-        terminal.print(text, markup=False, soft_wrap=True)
-    _show(program, as_json, verbose, remarks)
+
+
+def _check_wanted(wanted: Sequence[Path], settings: Path | None) -> None:
+    """Raise where a file cannot be written, or settings are of none of them."""
+    for target in wanted:
+        _check(target)
+    if settings is not None and not any(_switches(target) for target in wanted):
+        raise sm.errors.ProblemError(
+            "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
+        )
+
+
+def _check_programs(
+    work: SeamJob, wanted: Sequence[Path], asked: sm.files.ProgramSettings | None
+) -> None:
+    """Raise where a controller's program could not be written of a job."""
+    if asked is None and not any(_switches(target) for target in wanted):
+        return
+    settings = asked or sm.files.ProgramSettings()
+    happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
+    controllers.check_signals(happens, settings)
+    for target in wanted:
+        if target.suffix.lower() in controllers.PROGRAMS:
+            form = controllers.PROGRAMS[target.suffix.lower()]
+            controllers.check_controller(work.robot, form, settings)
+
+
+def _print_feed(program: sm.Program) -> None:
+    feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
+    text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
+    terminal.print(text, markup=False, soft_wrap=True)
+
+
+def _write_wanted(
+    program: sm.Program,
+    wanted: Sequence[Path],
+    asked: sm.files.ProgramSettings | None,
+    as_json: bool,
+) -> None:
+    """Write a program into all files, but those that a motion with gaps has no place in."""
     # What is only of programs of targets is said for these, where there are some.
     has_targets = any(target.suffix.lower() in controllers.PROGRAMS for target in wanted)
     for target in wanted:
@@ -141,7 +168,6 @@ def job(
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
             outputs.print_large(target, terminal)
-    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 
 def _check(file: Path) -> None:

@@ -1,8 +1,7 @@
 """The commands about a cell: how wrong it may be, and where to put the part."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +9,6 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion.basics import write_document
 from selfmotion.shell.cli import checks, documents, options, outputs
 from selfmotion.shell.cli.app import (
     LOOK,
@@ -24,8 +22,6 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
-from selfmotion.shell.documents import SeamJob, belonging, moved_workpiece
-from selfmotion.work.batch import processes
 
 # The commands that say how wrong a cell may be.
 
@@ -229,133 +225,6 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-# The commands that look for a place, or for a motion that bears another one.
-
-_Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
-_Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
-# Suffixes of problem files.
-_PROBLEM_SUFFIXES = (".toml", ".json")
-# Suffixes of pages and pictures.
-_PAGE_SUFFIXES = (".html", ".png")
-
-
-@app.command(
-    epilog="Example: selfmotion place cell.toml --x=-0.2,0.2 --yaw=-0.5,0.5 --part block --out "
-    "placed.toml --map map.html",
-    rich_help_panel=PLAN,
-)
-def place(
-    files: Annotated[list[Path], typer.Argument(help="Problem files, of one arm.")],
-    x: _Range = None,
-    y: _Range = None,
-    z: _Range = None,
-    roll: _Turns = None,
-    pitch: _Turns = None,
-    yaw: _Turns = None,
-    base: Annotated[
-        bool, typer.Option("--base", help="Move the arm's base, not the part.")
-    ] = False,
-    part: Annotated[
-        list[str] | None,
-        typer.Option(help="An obstacle that belongs to the part (may be given several times)."),
-    ] = None,
-    path_alone: Annotated[
-        bool, typer.Option("--path-alone", help="No obstacle moves along with the path.")
-    ] = False,
-    center: Annotated[
-        str | None,
-        typer.Option(help="Centre of rotation: x,y,z (m); by default the middle of the paths."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes; by default this one alone.", min=1)
-    ] = None,
-    deadline: options.DeadlineOption = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Problem file (.toml, .json) or plan (.npz) at the place; of several problems "
-            "numbered. Repeatable."
-        ),
-    ] = None,
-    drawn: Annotated[
-        list[Path] | None,
-        typer.Option("--map", help="Map of places around it, as .html or .png. Repeatable."),
-    ] = None,
-    points: Annotated[int, typer.Option(help="Points of the map in each direction.", min=2)] = 9,
-    settings: options.SetOption = None,
-    allow_code: options.AllowCodeOption = False,
-) -> None:
-    """Find the place of the part, or of the arm, at which the motions cost least.
-
-    Of a job all seams are placed together, and a job file is written. What stands in the frame of
-    a file's workpiece belongs to the part.
-    """
-    if part and path_alone:
-        raise sm.errors.ProblemError(
-            "--part and --path-alone say different things; give one of them"
-        )
-    for file in [*(out or []), *(drawn or [])]:
-        known = (*_PROBLEM_SUFFIXES, ".npz") if file in (out or []) else _PAGE_SUFFIXES
-        if file.suffix not in known:
-            raise sm.errors.FileFormatError(
-                f"{file}: expected a name that ends in {', '.join(known)}"
-            )
-    read = [documents.document_of(file, settings or []) for file in files]
-    jobs = [file for file, document in zip(files, read, strict=True) if "seams" in document]
-    if jobs and len(files) > 1:
-        raise sm.errors.ProblemError(f"{jobs[0]}: is a job of many seams; give it alone")
-    if jobs:
-        job = documents.seams_of_file(jobs[0], settings or [], allow_code)
-        problems = list(job.problems)
-        _check_placed_jobs(jobs[0], out or [], base)
-    else:
-        problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
-    if not (base or part or path_alone):
-        for file, document in zip(files, read, strict=True):
-            _check_stands(file, document)
-    known_parts = [names for names in map(belonging, read) if names is not None]
-    named = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
-    within = {
-        name: options.numbers(text, f"--{name}", 2)
-        for name, text in named.items()
-        if text is not None
-    }
-    given: dict[str, Any] = {"of": "base" if base else "part"}
-    if part or path_alone:
-        given["part"] = part or ()
-    elif known_parts and not base:
-        given["part"] = sorted({name for names in known_parts for name in names})
-    if center is not None:
-        given["center"] = options.numbers(center, "--center", 3)
-    if jobs and out:
-        _check_moved_bodies(jobs[0], read[0], job, given.get("part", ()))
-    with ExitStack() as stack:
-        display = stack.enter_context(StageDisplay(stages))
-        if workers is not None:
-            given["executor"] = stack.enter_context(processes(workers))
-        found = sm.place(problems, within, deadline=deadline, progress=display.stage, **given)
-    terminal.print(str(found), markup=False, soft_wrap=True)
-    for file in out or []:
-        if jobs:
-            # Paths are in the frame of the reference, which need not be the world.
-            frame = problems[0].follows.items[0].chain.base_placement
-            by = frame.inverse() * found.displacement * frame
-            write_document(file, moved_workpiece(read[0], by))
-            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
-        else:
-            _write(found, file)
-    if drawn:
-        pictured = found.map(points=points) if len(within) > 1 else None
-        for file in drawn:
-            if file.suffix == ".html":
-                sm.files.write_placement(found, file, pictured)
-            elif pictured is None:
-                raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
-            else:
-                pictured.figure().savefig(file)
-            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
-
-
 @app.command(
     "plan-margin",
     epilog="Example: selfmotion plan-margin cell.toml --position 0.005 --rotation 0.01 --out a.npz",
@@ -390,62 +259,3 @@ def plan_margin(
     terminal.print(str(found), markup=False, soft_wrap=True)
     outputs.write(found.plan, out or [], None, terminal, quiet=False)
     raise typer.Exit(VERIFIED if found.reached else NOT_VERIFIED)
-
-
-def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
-    """Raise where a job at its place cannot be written."""
-    for file in out:
-        if base:
-            raise sm.errors.ProblemError(
-                f"{file}: a job whose arm's base is moved is not written; set robot.base to the "
-                f"place that is found"
-            )
-        if file.suffix not in _PROBLEM_SUFFIXES or file.resolve().parent != job.resolve().parent:
-            raise sm.errors.FileFormatError(
-                f"{file}: expected a job file ({', '.join(_PROBLEM_SUFFIXES)}) beside {job}, whose "
-                f"files it names"
-            )
-
-
-def _check_stands(file: Path, document: Mapping[str, Any]) -> None:
-    """Raise where bodies of a workpiece are not in the world, where places are."""
-    link = document["workpiece"].get("on") if belonging(document) else None
-    if link is not None:
-        raise sm.errors.ProblemError(
-            f"{file}: the workpiece is on '{link}', and its bodies with it; a part is placed in "
-            f"the world: leave out workpiece.on, or give --base"
-        )
-
-
-def _check_moved_bodies(
-    file: Path, document: Mapping[str, Any], job: SeamJob, part: Sequence[str]
-) -> None:
-    """Raise where moving its workpiece would not move what was placed of a job."""
-    own = belonging(document) or ()
-    if set(part) != set(own):
-        raise sm.errors.ProblemError(
-            f"{file}: a job is written at its place with its [workpiece] moved, to which belongs "
-            f"{', '.join(own) or 'no obstacle'}, not {', '.join(part) or 'nothing'}; have in "
-            f"workpiece.obstacles what moves along, or leave out --out"
-        )
-    frame = job.problems[0].follows.items[0].chain.base_placement
-    is_on = (document.get("workpiece") or {}).get("on") is not None
-    bodies = own or any(seam.leaves for seam in job.seams)
-    if bodies and not is_on and not frame.isIdentity(1e-9):
-        raise sm.errors.ProblemError(
-            f"{file}: paths are in the frame of '{job.robot.reference}', bodies of the workpiece "
-            f"in the world, so that no frame of the workpiece moves both alike; leave out "
-            f"robot.reference, or --out"
-        )
-
-
-def _write(found: sm.placement.Placement, file: Path) -> None:
-    """Write the problems or plans of a place, numbered where they are several."""
-    several = len(found.plans) > 1
-    for number, plan in enumerate(found.plans):
-        named = file.with_stem(f"{file.stem}-{number}") if several else file
-        if named.suffix == ".npz":
-            plan.save(named)
-        else:
-            sm.files.write_problem(plan.problem, named)
-        terminal.print(f"wrote {named}", markup=False, soft_wrap=True)

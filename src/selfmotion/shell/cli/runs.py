@@ -93,23 +93,10 @@ def batch(
 
     Exit code 0 if some combination of each file is verified.
     """
-    from selfmotion.shell.documents import grid_items
-    from selfmotion.work.batch import plan_items, unread_item
+    from selfmotion.work.batch import plan_items
 
     check_cluster(dask, workers)
-    several = list[list["Item"]]()
-    for file in files:
-        try:
-            several.append(grid_items(file, allow_code=allow_code))
-            has_outputs = bool(basics.read_document(file).get("outputs"))
-        except sm.errors.FileFormatError as error:
-            # Of many files one that cannot be read is a row like others that cannot be planned.
-            if len(files) == 1:
-                raise
-            several.append([unread_item(file, error)])
-            continue
-        if has_outputs:
-            _print_note(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
+    several = [_items_of(file, len(files) > 1, out, allow_code) for file in files]
     items = [item for each in several for item in each]
     names = [item.name for item in items]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -135,6 +122,23 @@ def batch(
         tables.show_batch(result, terminal)
     verified = {row.name for row in result.rows if row.verified}
     raise typer.Exit(VERIFIED if is_answered(several, verified) else NOT_VERIFIED)
+
+
+def _items_of(file: Path, is_one_of_many: bool, out: Path, allow_code: bool) -> list["Item"]:
+    """Return what a file asks to plan; of many files, one that cannot be read is a row, too."""
+    from selfmotion.shell.documents import grid_items
+    from selfmotion.work.batch import unread_item
+
+    try:
+        found = list(grid_items(file, allow_code=allow_code))
+        has_outputs = bool(basics.read_document(file).get("outputs"))
+    except sm.errors.FileFormatError as error:
+        if not is_one_of_many:
+            raise
+        return [unread_item(file, error)]
+    if has_outputs:
+        _print_note(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
+    return found
 
 
 def is_answered(several: Sequence[Sequence["Item"]], verified: Container[str]) -> bool:

@@ -1,5 +1,6 @@
 """Whether a document is a problem file: its keys and types, by pydantic."""
 
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
@@ -84,9 +85,9 @@ def _checked_clearance(given: Any, where: str) -> Any:
     try:
         model = clearance_model().model_validate(document)
     except ValidationError as error:
-        said = _message(error, document).removeprefix("clearance").removeprefix(": ")
-        mark = ": " if not said.startswith(".") else ""
-        raise FileFormatError(f"{where}{mark}{said}") from error
+        # Of several faults each is named.
+        said = re.sub(r"(?m)(^|; )clearance\b", rf"\g<1>{where}", _message(error, document))
+        raise FileFormatError(said) from error
     return _given(model)["clearance"]
 
 

@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from selfmotion.basics import Array
 from selfmotion.certificate import Quantity
 from selfmotion.model.collision import CollisionModel
-from selfmotion.model.follow import BoundTaskFrame
+from selfmotion.model.follow import BoundTaskFrame, is_plain
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel, null_space
 from selfmotion.model.task import SE3, Task
@@ -322,7 +322,7 @@ def self_motion(problem: Problem, trajectory: Trajectory) -> SelfMotion | None:
     others move as little as they have to. Steps end where a joint meets its limit.
     """
     follows = problem.follows
-    if follows.redundancy < 1 or not follows.is_plain:
+    if follows.redundancy < 1 or not is_plain(follows):
         return None
     robot = problem.robot
     times = np.linspace(0.0, trajectory.duration, _TIMES)

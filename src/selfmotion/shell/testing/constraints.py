@@ -18,7 +18,7 @@ from selfmotion.certificate import (
 )
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import bound_conditions, on_path
 from selfmotion.planning.paper import MinimumNormMotion, Objective, node_tangents
 from selfmotion.planning.search import start_candidates
 from selfmotion.problem.constraints import BoundConstraint, Constraint, linearised
@@ -117,7 +117,7 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     start = problem.given_start
     if start is None:
         start = start_candidates(problem.follows, _STARTS, np.random.default_rng(0))[0]
-    formulation = Formulation.on_path(problem)
+    formulation = on_path(problem)
     grid = Grid.aligned(formulation.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
     minimum_norm = MinimumNormMotion.on(formulation, start, grid)
     own = constraint.conditions(robot)
@@ -125,7 +125,7 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     objective = Objective.of(formulation, minimum_norm, free=True)
     requirement = constraint.requirement(robot)
     require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")
-    for bound in formulation.bound(own, *ends).every:
+    for bound in bound_conditions(formulation, own, *ends).every:
         _check_derivatives(objective, bound)
         _judges_alike(objective, bound, requirement, robot, np.random.default_rng(2))
     saved(constraint, Constraint)

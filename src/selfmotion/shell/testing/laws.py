@@ -12,7 +12,7 @@ from selfmotion.model.motion import Grid, NullMotion, PolynomialNullMotion, Samp
 from selfmotion.model.path import Line, Path
 from selfmotion.model.robot import RobotModel, load_robot
 from selfmotion.model.task import Task, exp3, log3
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import Iteration, Minimum, Optimizer
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.problem.costs import Cost, Samples
@@ -300,6 +300,6 @@ def _objective(problem: Problem) -> Objective:
     start = problem.given_start
     if start is None:
         raise RuntimeError("these problems have a start")
-    formulation = Formulation.on_path(problem)
+    formulation = on_path(problem)
     grid = Grid.aligned(formulation.knots, _STEPS)
     return Objective.of(formulation, MinimumNormMotion.on(formulation, start, grid))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.basics import Array, Flags
+from selfmotion.model.follow import is_plain
 from selfmotion.model.path import spread_along
 from selfmotion.planning.search import Manifold, spread
 from selfmotion.problem.problem import Problem
@@ -79,7 +80,7 @@ class Floor:
             and all(
                 len(problem.follows.items) == 1
                 and problem.follows.items[0].chain.carrier < 0
-                and problem.follows.is_plain
+                and is_plain(problem.follows)
                 for problem in problems
             )
         )

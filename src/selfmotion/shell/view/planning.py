@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import Array, ProblemError, Progress, SelfmotionError
+from selfmotion.model.follow import is_plain
 from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, retime
@@ -272,7 +273,7 @@ class Planning:
         last, robot = self.last, problem.robot
         if last is None or last.robot.joint_names != robot.joint_names:
             return None
-        if not problem.follows.is_plain:
+        if not is_plain(problem.follows):
             return None
         return coarse(problem, last.trajectory)
 

@@ -171,6 +171,14 @@ class _Reader:
             raise machine.unread(f"'{text[:60]}'")
         word, rest = found[1], (found[2] or "").strip()
         given = [item.strip() for item in rest.split(",")] if rest else []
+        if word in _ENDS:
+            return True
+        if not self._goes(word, rest, given):
+            self._says(text, word, rest, given)
+        return False
+
+    def _goes(self, word: str, rest: str, given: list[str]) -> bool:
+        """Take a statement of where or how the tool goes; return whether it is one."""
         match word:
             case "GOHOME" if len(given) < 3:
                 self._go_home()
@@ -182,11 +190,19 @@ class _Reader:
                 self._ahead = self._axes @ self._numbers(word, given, 3)
             case "TLAXIS":
                 self._axis = self._direction(self._numbers(word, given, 3).tolist())
-                machine.says_axis = True
+                self.machine.says_axis = True
             case "RAPID" if not rest:
                 self._rapid = True
             case "FEDRAT":
                 self._feed(given)
+            case _:
+                return False
+        return True
+
+    def _says(self, text: str, word: str, rest: str, given: list[str]) -> None:
+        """Take any other statement, or refuse it."""
+        machine = self.machine
+        match word:
             case "UNITS" | "UNIT":
                 if len(given) != 1 or given[0] not in _UNITS:
                     raise machine.fault(f"{word}/{rest[:40]}: expected MM or INCHES")
@@ -218,17 +234,14 @@ class _Reader:
                     )
             case _ if word in _EVENTS:
                 machine.happens(f"{word}/{','.join(given)}" if given else word)
-            case _ if word in _ENDS:
-                return True
             case _ if word in _HARMLESS and rest.replace(" ", "") in _HARMLESS[word]:
-                return False
+                pass
             case "OPSKIP":
                 machine.note("OPSKIP: what may be skipped is read")
             case _ if word in _REASONS:
                 raise machine.fault(f"{text[:40]}: {_REASONS[word]}; it is not read")
             case _ if word not in _NOTHING:
                 raise machine.unread(f"statement '{text[:40]}'")
-        return False
 
     def _only(self, word: str, said: str, what: str) -> None:
         """Refuse a statement that says something else than the first of its kind did."""

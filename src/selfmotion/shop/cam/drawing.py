@@ -79,28 +79,7 @@ def read_drawing(
     ProblemError
         The package that reads drawings is not installed.
     """
-    try:
-        from ezdxf.filemanagement import readfile
-        from ezdxf.lldxf.const import DXFError
-    except ModuleNotFoundError:
-        raise ProblemError("drawings need ezdxf: pip install 'selfmotion[dxf]'") from None
-    corrupt = (DXFError, *_CORRUPT)
-    try:
-        size = file.stat().st_size
-    except OSError as error:
-        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    if size > _MAX_FILE_SIZE:
-        raise FileFormatError(f"{file}: has {size} bytes, expected {_MAX_FILE_SIZE} at most")
-    try:
-        with file.open("rb") as stream:
-            is_dwg = _DWG.match(stream.read(8)) is not None
-        if is_dwg:
-            raise FileFormatError(f"{file}: is a DWG drawing, expected DXF: save it as DXF in CAD")
-        drawing = readfile(file)
-    except FileFormatError:
-        raise
-    except corrupt as error:
-        raise FileFormatError(_UNREADABLE.format(file, _one_line(error))) from error
+    drawing, corrupt = _drawing_of(file)
     unit = unit or _INSUNITS.get(drawing.units)
     if unit is None:
         raise FileFormatError(
@@ -141,6 +120,32 @@ def read_drawing(
         *([f"passed over: layers that are off or frozen: {layers_off}"] if hidden_layers else []),
     )
     return {name: replace(rows, notes=notes) for name, rows in found.items()}
+
+
+def _drawing_of(file: FilePath) -> tuple[Any, tuple[type[Exception], ...]]:
+    """Return a drawing as ezdxf reads it, and the errors of what is corrupt in it."""
+    try:
+        from ezdxf.filemanagement import readfile
+        from ezdxf.lldxf.const import DXFError
+    except ModuleNotFoundError:
+        raise ProblemError("drawings need ezdxf: pip install 'selfmotion[dxf]'") from None
+    corrupt = (DXFError, *_CORRUPT)
+    try:
+        size = file.stat().st_size
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    if size > _MAX_FILE_SIZE:
+        raise FileFormatError(f"{file}: has {size} bytes, expected {_MAX_FILE_SIZE} at most")
+    try:
+        with file.open("rb") as stream:
+            is_dwg = _DWG.match(stream.read(8)) is not None
+        if is_dwg:
+            raise FileFormatError(f"{file}: is a DWG drawing, expected DXF: save it as DXF in CAD")
+        return readfile(file), corrupt
+    except FileFormatError:
+        raise
+    except corrupt as error:
+        raise FileFormatError(_UNREADABLE.format(file, _one_line(error))) from error
 
 
 def _entities(

@@ -252,16 +252,8 @@ def read_path(
             "lift": lift,
         },
     )
-    reading = Reading.of(
-        path,
-        {
-            "columns": columns,
-            "rotary": rotary,
-            "rotary_axes": rotary_axes,
-            "rotary_center": rotary_center,
-            "unit": unit,
-        },
-    )
+    table = {"rotary": rotary, "rotary_axes": rotary_axes, "rotary_center": rotary_center}
+    reading = Reading.of(path, {"columns": columns, "unit": unit, **table})
     return path_of_rows(path, one_seam(path, seam, reading), pacing)
 
 

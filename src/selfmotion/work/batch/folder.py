@@ -17,7 +17,7 @@ from selfmotion.certificate import USUAL
 from selfmotion.model.path import Path as ToolPath, Retimed
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.planning.result import MotionSpecification, Plan, load_plan, read_kept, write_kept
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, along_other_paths
 from selfmotion.work.batch.items import LATE, Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
 
@@ -53,7 +53,9 @@ def answers(plan: Plan, job: PlanRequest) -> bool:
 
 def _at_its_own_pace(problem: Problem, asked: Problem) -> Problem:
     """Return a problem along its paths before retiming, with the windows of the request."""
-    return replace(problem, **problem.along(_original), relaxations=tuple(asked.relaxations))
+    return replace(
+        problem, **along_other_paths(problem, _original), relaxations=tuple(asked.relaxations)
+    )
 
 
 def _original(path: ToolPath) -> ToolPath:

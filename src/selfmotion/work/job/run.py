@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -287,33 +288,17 @@ def plan_job(
     check_executor(executor)
     clock = Deadline.after(deadline)
     told = clock.checked_by(obeying(progress))
-    for seam in sorted(listed, key=_slowest):
-        kept = envelope_without_arm(robot, [*settings.constraints, *seam.constraints])
-        check_feeds(f"seam '{seam.name}'", [seam.path], kept.tool_speed)
+    _check_seams(settings, listed, sent=folder is not None or executor is not None)
     is_free = as_choice(order, "order", ("free", "given")) == "free"
-    if folder is not None or executor is not None:
-        for seam in listed:
-            check_can_be_sent(seam.costs or ())
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
-    moves = FreeMotions(robot, settings.move_constraints(()), np.random.default_rng(0))
-    for name, q in zip(("start", "end"), ends, strict=True):
-        refused = "" if q is None else moves.refusal(q)
-        if refused:
-            raise ProblemError(f"{robot.name}: the job's {name}: {refused}")
+    _check_ends(settings, ends)
     # Processes and schedulers wait for Ctrl-C themselves.
     held = nullcontext() if executor is not None else held_interruption()
     with held:
         cache = ResultCache(None if folder is None else as_path(folder), Tolerance(), {})
-        specification = Specification(
-            listed,
-            not is_free,
-            ends[0],
-            ends[1],
-            settings.constraints,
-            settings.clearance,
-            arm=arm_digest(robot),
-        )
+        kept = {"constraints": settings.constraints, "clearance": settings.clearance}
+        specification = _specification(listed, not is_free, ends, arm=arm_digest(robot), **kept)
         make = partial(Work, settings, cache, executor, told)
         try:
             return _program(specification, make, ends, price, warm_start)
@@ -325,6 +310,31 @@ def plan_job(
                 f"{robot.name}: the deadline of {deadline} s came before there was a program; of "
                 f"what was planned by then {on}: plan again, or allow more time"
             ) from None
+
+
+def _specification(
+    seams: tuple[Seam, ...], in_order: bool, ends: Sequence[Array | None], **given: Any
+) -> Specification:
+    start, end = ends
+    return Specification(seams, in_order, start, end, **given)
+
+
+def _check_seams(settings: JobSettings, seams: Sequence[Seam], *, sent: bool) -> None:
+    """Raise an error where a seam's feed, the slowest one's, is none; or it cannot be `sent`."""
+    for seam in sorted(seams, key=_slowest):
+        kept = envelope_without_arm(settings.robot, [*settings.constraints, *seam.constraints])
+        check_feeds(f"seam '{seam.name}'", [seam.path], kept.tool_speed)
+    for seam in seams if sent else ():
+        check_can_be_sent(seam.costs or ())
+
+
+def _check_ends(settings: JobSettings, ends: Sequence[Array | None]) -> None:
+    """Raise ProblemError where no move may begin at the job's start, or end at its end."""
+    moves = FreeMotions(settings.robot, settings.move_constraints(()), np.random.default_rng(0))
+    for name, q in zip(("start", "end"), ends, strict=True):
+        refused = "" if q is None else moves.refusal(q)
+        if refused:
+            raise ProblemError(f"{settings.robot.name}: the job's {name}: {refused}")
 
 
 def _program(

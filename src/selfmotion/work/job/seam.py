@@ -15,7 +15,7 @@ from selfmotion.model.task import Relaxation, Task
 from selfmotion.planning.result import Move, Plan
 from selfmotion.problem.constraints import Clearance, Constraint, clearances_among
 from selfmotion.problem.costs import Cost
-from selfmotion.problem.problem import Problem, rest_orders
+from selfmotion.problem.problem import Problem, along_other_paths, rest_orders
 from selfmotion.work.job.stops import Precedences
 
 # One step of a program: a seam, a move or a wait.
@@ -268,7 +268,7 @@ def reversing(duration: float) -> Callable[[Array], Array]:
 
 def backwards(problem: Problem) -> Problem:
     """Return the problem of a path the other way round."""
-    turned = problem.along(Reversed, reversing(problem.path.duration))
+    turned = along_other_paths(problem, Reversed, reversing(problem.path.duration))
     return replace(problem, **turned, start=None)
 
 

@@ -124,13 +124,7 @@ def place(
         if not clock.passed:
             raise
         tried = [*known, *run.tried]
-        sound = [item for item in tried if np.isfinite(item.cost)]
-        if not sound:
-            raise DeadlineError(
-                f"place: the deadline of {deadline} s came before there was a verified motion at "
-                f"any of {len(tried)} places; allow more time, or ask less"
-            ) from None
-        best = min(sound, key=lambda item: item.cost)
+        best = _best_so_far(tried, deadline)
     if not np.isfinite(best.cost):
         raise PlanError(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
@@ -153,6 +147,17 @@ def place(
         best,
         flat_along(places, box, best),
     )
+
+
+def _best_so_far(tried: Sequence[Tried], deadline: float | None) -> Tried:
+    """Return the cheapest place with verified motions when a deadline came; or DeadlineError."""
+    sound = [item for item in tried if np.isfinite(item.cost)]
+    if not sound:
+        raise DeadlineError(
+            f"place: the deadline of {deadline} s came before there was a verified motion at "
+            f"any of {len(tried)} places; allow more time, or ask less"
+        ) from None
+    return min(sound, key=lambda item: item.cost)
 
 
 def _planned(places: Places, best: Tried) -> Tried:

@@ -1,0 +1,263 @@
+"""The command that looks for the place of a part, or of an arm."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import selfmotion as sm
+from selfmotion.basics import write_document
+from selfmotion.shell.cli import documents, options
+from selfmotion.shell.cli.app import PLAN, StageDisplay, app, stages, terminal
+from selfmotion.shell.documents import SeamJob, belonging, moved_workpiece
+from selfmotion.work.batch import processes
+
+_Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
+_Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
+# Suffixes of problem files.
+_PROBLEM_SUFFIXES = (".toml", ".json")
+# Suffixes of pages and pictures.
+_PAGE_SUFFIXES = (".html", ".png")
+
+
+@app.command(
+    epilog="Example: selfmotion place cell.toml --x=-0.2,0.2 --yaw=-0.5,0.5 --part block --out "
+    "placed.toml --map map.html",
+    rich_help_panel=PLAN,
+)
+def place(
+    files: Annotated[list[Path], typer.Argument(help="Problem files, of one arm.")],
+    x: _Range = None,
+    y: _Range = None,
+    z: _Range = None,
+    roll: _Turns = None,
+    pitch: _Turns = None,
+    yaw: _Turns = None,
+    base: Annotated[
+        bool, typer.Option("--base", help="Move the arm's base, not the part.")
+    ] = False,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help="An obstacle that belongs to the part (may be given several times)."),
+    ] = None,
+    path_alone: Annotated[
+        bool, typer.Option("--path-alone", help="No obstacle moves along with the path.")
+    ] = False,
+    center: Annotated[
+        str | None,
+        typer.Option(help="Centre of rotation: x,y,z (m); by default the middle of the paths."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; by default this one alone.", min=1)
+    ] = None,
+    deadline: options.DeadlineOption = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Problem file (.toml, .json) or plan (.npz) at the place; of several problems "
+            "numbered. Repeatable."
+        ),
+    ] = None,
+    drawn: Annotated[
+        list[Path] | None,
+        typer.Option("--map", help="Map of places around it, as .html or .png. Repeatable."),
+    ] = None,
+    points: Annotated[int, typer.Option(help="Points of the map in each direction.", min=2)] = 9,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+) -> None:
+    """Find the place of the part, or of the arm, at which the motions cost least.
+
+    Of a job all seams are placed together, and a job file is written. What stands in the frame of
+    a file's workpiece belongs to the part.
+    """
+    asked = _Asked(tuple(files), tuple(out or ()), base, part, path_alone, tuple(settings or ()))
+    asked.check(drawn or [])
+    read = asked.documents()
+    job = asked.job(read, allow_code)
+    problems = asked.problems(allow_code) if job is None else list(job.problems)
+    within = _within({"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw})
+    given = asked.moving(read, center)
+    if job is not None and out:
+        _check_moved_bodies(files[0], read[0], job, given.get("part", ()))
+    found = _placed(workers, problems, within, deadline=deadline, **given)
+    terminal.print(str(found), markup=False, soft_wrap=True)
+    for file in out or []:
+        if job is None:
+            _write(found, file)
+        else:
+            _write_job(found, read[0], problems[0], file)
+    if drawn:
+        _draw(found, drawn, found.map(points=points) if len(within) > 1 else None)
+
+
+def _within(named: Mapping[str, str | None]) -> dict[str, Any]:
+    """Return the ranges that are given, by coordinate."""
+    return {
+        name: options.numbers(text, f"--{name}", 2)
+        for name, text in named.items()
+        if text is not None
+    }
+
+
+def _placed(workers: int | None, *given: Any, **settings: Any) -> sm.placement.Placement:
+    """Return the best place, looked for in processes where `workers` are given; see `place`."""
+    with ExitStack() as stack:
+        display = stack.enter_context(StageDisplay(stages))
+        if workers is not None:
+            settings["executor"] = stack.enter_context(processes(workers))
+        return sm.place(*given, progress=display.stage, **settings)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be placed, and how it moves.
+
+    Attributes
+    ----------
+    files, out : tuple of Path
+    base, path_alone : bool
+    part : list of str or None
+    settings : tuple of str
+    """
+
+    files: tuple[Path, ...]
+    out: tuple[Path, ...]
+    base: bool
+    part: list[str] | None
+    path_alone: bool
+    settings: tuple[str, ...]
+
+    def check(self, drawn: Sequence[Path]) -> None:
+        """Raise where options contradict each other, or a file is of no known kind."""
+        if self.part and self.path_alone:
+            raise sm.errors.ProblemError(
+                "--part and --path-alone say different things; give one of them"
+            )
+        for file in [*self.out, *drawn]:
+            known = (*_PROBLEM_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
+            if file.suffix not in known:
+                raise sm.errors.FileFormatError(
+                    f"{file}: expected a name that ends in {', '.join(known)}"
+                )
+
+    def documents(self) -> list[Mapping[str, Any]]:
+        """Return the documents of the files; an error where a job is one of several."""
+        read = [documents.document_of(file, list(self.settings)) for file in self.files]
+        jobs = [file for file, found in zip(self.files, read, strict=True) if "seams" in found]
+        if jobs and len(self.files) > 1:
+            raise sm.errors.ProblemError(f"{jobs[0]}: is a job of many seams; give it alone")
+        return list(read)
+
+    def job(self, read: Sequence[Mapping[str, Any]], allow_code: bool) -> SeamJob | None:
+        """Return the job that the file describes, which can be written at its place, or None."""
+        if "seams" not in read[0]:
+            return None
+        job = documents.seams_of_file(self.files[0], list(self.settings), allow_code)
+        _check_placed_jobs(self.files[0], self.out, self.base)
+        return job
+
+    def problems(self, allow_code: bool) -> list[sm.Problem]:
+        """Return the problems of the files."""
+        settings = list(self.settings)
+        return [documents.of_file(file, settings, allow_code).problem for file in self.files]
+
+    def moving(self, read: Sequence[Mapping[str, Any]], center: str | None) -> dict[str, Any]:
+        """Return what moves, as `place` is told: the arm's base, or the part with its bodies."""
+        if not (self.base or self.part or self.path_alone):
+            for file, document in zip(self.files, read, strict=True):
+                _check_stands(file, document)
+        known_parts = [names for names in map(belonging, read) if names is not None]
+        given: dict[str, Any] = {"of": "base" if self.base else "part"}
+        if self.part or self.path_alone:
+            given["part"] = self.part or ()
+        elif known_parts and not self.base:
+            given["part"] = sorted({name for names in known_parts for name in names})
+        if center is not None:
+            given["center"] = options.numbers(center, "--center", 3)
+        return given
+
+
+def _write_job(
+    found: sm.placement.Placement, document: Mapping[str, Any], problem: sm.Problem, file: Path
+) -> None:
+    """Write the document of a job with its workpiece moved to the place."""
+    # Paths are in the frame of the reference, which need not be the world.
+    frame = problem.follows.items[0].chain.base_placement
+    by = frame.inverse() * found.displacement * frame
+    write_document(file, moved_workpiece(document, by))
+    terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+def _draw(found: sm.placement.Placement, drawn: Sequence[Path], pictured: Any) -> None:
+    """Write maps of places, as pages or pictures; of one coordinate there is no picture."""
+    for file in drawn:
+        if file.suffix == ".html":
+            sm.files.write_placement(found, file, pictured)
+        elif pictured is None:
+            raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
+        else:
+            pictured.figure().savefig(file)
+        terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
+    """Raise where a job at its place cannot be written."""
+    for file in out:
+        if base:
+            raise sm.errors.ProblemError(
+                f"{file}: a job whose arm's base is moved is not written; set robot.base to the "
+                f"place that is found"
+            )
+        if file.suffix not in _PROBLEM_SUFFIXES or file.resolve().parent != job.resolve().parent:
+            raise sm.errors.FileFormatError(
+                f"{file}: expected a job file ({', '.join(_PROBLEM_SUFFIXES)}) beside {job}, whose "
+                f"files it names"
+            )
+
+
+def _check_stands(file: Path, document: Mapping[str, Any]) -> None:
+    """Raise where bodies of a workpiece are not in the world, where places are."""
+    link = document["workpiece"].get("on") if belonging(document) else None
+    if link is not None:
+        raise sm.errors.ProblemError(
+            f"{file}: the workpiece is on '{link}', and its bodies with it; a part is placed in "
+            f"the world: leave out workpiece.on, or give --base"
+        )
+
+
+def _check_moved_bodies(
+    file: Path, document: Mapping[str, Any], job: SeamJob, part: Sequence[str]
+) -> None:
+    """Raise where moving its workpiece would not move what was placed of a job."""
+    own = belonging(document) or ()
+    if set(part) != set(own):
+        raise sm.errors.ProblemError(
+            f"{file}: a job is written at its place with its [workpiece] moved, to which belongs "
+            f"{', '.join(own) or 'no obstacle'}, not {', '.join(part) or 'nothing'}; have in "
+            f"workpiece.obstacles what moves along, or leave out --out"
+        )
+    frame = job.problems[0].follows.items[0].chain.base_placement
+    is_on = (document.get("workpiece") or {}).get("on") is not None
+    bodies = own or any(seam.leaves for seam in job.seams)
+    if bodies and not is_on and not frame.isIdentity(1e-9):
+        raise sm.errors.ProblemError(
+            f"{file}: paths are in the frame of '{job.robot.reference}', bodies of the workpiece "
+            f"in the world, so that no frame of the workpiece moves both alike; leave out "
+            f"robot.reference, or --out"
+        )
+
+
+def _write(found: sm.placement.Placement, file: Path) -> None:
+    """Write the problems or plans of a place, numbered where they are several."""
+    several = len(found.plans) > 1
+    for number, plan in enumerate(found.plans):
+        named = file.with_stem(f"{file.stem}-{number}") if several else file
+        if named.suffix == ".npz":
+            plan.save(named)
+        else:
+            sm.files.write_problem(plan.problem, named)
+        terminal.print(f"wrote {named}", markup=False, soft_wrap=True)
