@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import ProblemError
 from selfmotion.shell.view import opened as open_page
-from support.dragging import drag, settled, turn
+from support.dragging import PATIENCE, drag, settled, turn
 from support.industrial import two_seams
 from support.layouts import WIDTHS, chromium, faults
 from support.views import CIRCLE, Heard, Served, served
@@ -137,6 +137,42 @@ def test_a_number_is_typed(page: Any, server: Served) -> None:
     assert "expected 0 to 100" in page.locator("#told").inner_text()
     page.locator("#undo").click()
     settled(page, server)
+
+
+def test_the_map_beside_the_scene_says_why_and_its_slice_stays(page: Any, server: Served) -> None:
+    choice = page.locator("#maps:not(.stale) .map select")
+    choice.wait_for(timeout=PATIENCE)
+    labels = choice.locator("option").all_inner_texts()
+    names = settled(page, server).redundancy_coordinates()
+    assert labels[0] == "rotation of the tool about its axis"
+    assert [label.split("'")[1] for label in labels[1:]] == list(names[1 : len(labels)])
+    choice.select_option(labels[1])
+    page.locator("#maps svg").click()
+    assert page.locator("#pair").inner_text().startswith("shown from the map: ")
+    # Another plan has the same slice.
+    page.locator("[data-slider=duration]").fill("210")
+    settled(page, server)
+    page.locator("#maps.stale").wait_for(state="detached", timeout=PATIENCE)
+    choice.wait_for(timeout=PATIENCE)
+    assert choice.input_value() == labels[1]
+    page.locator("#undo").click()
+    settled(page, server)
+
+
+def test_places_in_reach_are_green_while_the_path_is_held(page: Any, server: Served) -> None:
+    held = """(held) => {
+      const { handles } = replay.live;
+      handles.choose("path");
+      handles.grip(held);
+      if (held) { handles.shown.get("path").mark.position.y += 0.001; handles.dragged(); }
+    }"""
+    page.evaluate(held, True)
+    page.locator("#green").wait_for(timeout=PATIENCE)
+    assert page.evaluate("viewer.nodes.has('/selfmotion/floor')")
+    page.evaluate(held, False)
+    settled(page, server)
+    page.locator("#green").wait_for(state="hidden", timeout=PATIENCE)
+    assert not page.evaluate("viewer.nodes.has('/selfmotion/floor')")
 
 
 def test_undo_goes_back(page: Any, server: Served) -> None:
