@@ -279,7 +279,7 @@ class Record:
         path = Waypoints.from_poses(self.t, list(self.targets))
         others, apart = said_once(constraints, NO_OVERLAP)
         problem = Problem(
-            robot, path, task, None, costs=tuple(costs), constraints=others, clearance=apart
+            robot, path, task, costs=tuple(costs), constraints=others, clearance=apart
         )
         rates = np.gradient(self.q, self.t, axis=0)
         motion = Trajectory(self.t, self.q, rates, robot.joint_names)

@@ -70,7 +70,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "self-collision", plan(given)
     yield "a free start", plan(free)
     yield "the paper's arm", plan(sm.sample_problem())
-    yield "bodies", plan(replace(given, constraints=[box]))
+    yield "bodies", plan(replace(given, constraints=(), clearance=box))
     torque = sm.constraints.JointTorqueLimits()
     yield "meshes", lambda: winding_number(np.zeros((1, 3, 3)), np.zeros(3))
     model = sm.obstacles.CollisionModel(arm, box.obstacles)
