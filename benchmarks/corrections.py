@@ -20,7 +20,7 @@ from rich.console import Console
 import selfmotion as sm
 from margins import ARMS, random_plan
 from selfmotion.problem.problem import start_on_path
-from selfmotion.work.placement.corners import _far, _standing
+from selfmotion.work.placement.corners import _difference, _fixed_obstacles
 from selfmotion.work.placement.places import COORDINATES, Places, Tried, places_of
 
 # No larger corrections are looked at [m], [rad].
@@ -50,7 +50,7 @@ def true_scale(places: Places, plan: sm.Plan, ways: np.ndarray) -> float:
     while high > 1.05 * low:
         scale = float(np.sqrt(low * high))
         tried = (places.corrected(scale * way, (plan,)) for way in ways)
-        fails = any(each.reason or _far(plan, each) for each in tried)
+        fails = any(each.reason or _difference(plan, each) for each in tried)
         low, high = (low, scale) if fails else (scale, high)
     return low
 
@@ -76,7 +76,7 @@ def main(
         seconds.append(time.process_time() - began)
         made += 1
         sizes.append((found.translation.size, found.rotation.size))
-        places = places_of([plan.problem], "part", _standing(plan), None, COORDINATES)
+        places = places_of([plan.problem], "part", _fixed_obstacles(plan), None, COORDINATES)
         for k in range(displacements):
             way = np.zeros(6)
             direction = rng.normal(size=3)
@@ -93,7 +93,7 @@ def main(
                 told = f"plan {number - 1}: {np.round(way, 4)}: {tried.reason}"
                 console.print(told, highlight=False, soft_wrap=True)
             else:
-                far += bool(_far(plan, tried))
+                far += bool(_difference(plan, tried))
         for rows, side in ((slice(0, 3), found.translation), (slice(3, 6), found.rotation)):
             # What was not looked at farther is not held against anything.
             if side.size > 0.0 and side.stops and number % SHARED == 0:
