@@ -13,7 +13,7 @@ from selfmotion.planning.nodes.motion import on_grid, subdivisions
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.rows import carried, conservatism, sampled_curve
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, control_times, unit_bases
-from selfmotion.problem.constraints import said_once
+from selfmotion.problem.constraints import separate_clearances
 from support.arms import PANDA_HOME
 from support.circles import small_circle
 from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
@@ -44,7 +44,7 @@ CONSTRAINTS = {
 
 def motion_with(panda: sm.RobotModel, name: str):
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    others, apart = said_once(CONSTRAINTS[name](), None)
+    others, apart = separate_clearances(CONSTRAINTS[name](), None)
     problem = sm.Problem(
         *(panda, path, "position", PANDA_HOME), constraints=others, rest=False, clearance=apart
     )

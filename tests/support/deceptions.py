@@ -20,7 +20,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.problem.constraints import NO_OVERLAP, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, separate_clearances
 from support.gantries import SLIDES, WIDE, gantry
 from support.own_dynamics import Moving, MovingArm
 from support.own_kinematics import along
@@ -514,7 +514,7 @@ def _judged(made: Cell, asked: Asked, limit: float, folder: Path) -> tuple[sm.Ce
     given = {"task": "position", "also": (), "relaxations": ()} | asked.problem
     tolerance = asked.tolerance(limit)
     try:
-        others, apart = said_once(constraints, NO_OVERLAP)
+        others, apart = separate_clearances(constraints, NO_OVERLAP)
         problem = sm.Problem(robot, dwell, constraints=others, clearance=apart, rest=False, **given)
     except (sm.errors.RedundancyError, sm.errors.ProblemError) as error:
         # A cell that cannot move in all the rows is judged, but not planned.

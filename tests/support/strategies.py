@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import NullMotion
-from selfmotion.problem.constraints import NO_OVERLAP, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, separate_clearances
 
 JOINTS = ("revolute", "revolute", "revolute", "prismatic", "continuous")
 AXES = ("0 0 1", "0 1 0", "1 0 0", "0 0 -1", "0.6 0 0.8", "0 0 2")
@@ -162,7 +162,7 @@ def build(words: Generated, folder: Path) -> sm.Problem:
     ]
     replaced = {type(item) for item in wanted}
     constraints = [*(item for item in limits if type(item) not in replaced), *wanted]
-    others, apart = said_once(constraints, NO_OVERLAP)
+    others, apart = separate_clearances(constraints, NO_OVERLAP)
     return sm.Problem(
         robot,
         path,

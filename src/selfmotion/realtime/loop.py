@@ -18,7 +18,7 @@ from selfmotion.model.path import Line, Path, Waypoints
 from selfmotion.model.task import SE3
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.result import Plan, Report
-from selfmotion.problem.constraints import NO_OVERLAP, Constraint, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, Constraint, separate_clearances
 from selfmotion.problem.costs import Cost, JointVelocity, Samples
 from selfmotion.problem.problem import Problem
 from selfmotion.realtime.commands import Segment
@@ -277,7 +277,7 @@ class Record:
         """
         robot, task = replanner.robot, replanner.task
         path = Waypoints.from_poses(self.t, list(self.targets))
-        others, apart = said_once(constraints, NO_OVERLAP)
+        others, apart = separate_clearances(constraints, NO_OVERLAP)
         problem = Problem(
             robot, path, task, costs=tuple(costs), constraints=others, clearance=apart
         )

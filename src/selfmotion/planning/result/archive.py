@@ -31,7 +31,12 @@ from selfmotion.model.motion import NullMotion, Trajectory
 from selfmotion.model.robot import RobotModel, mesh_digests
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.result.report import FUNCTION, Attempt, Gap, Report
-from selfmotion.problem.constraints import ActiveConstraint, Clearance, Constraint, said_once
+from selfmotion.problem.constraints import (
+    ActiveConstraint,
+    Clearance,
+    Constraint,
+    separate_clearances,
+)
 from selfmotion.problem.problem.digest import conditions_digest
 from selfmotion.problem.problem.problem import Problem
 from selfmotion.problem.problem.saved_problem import problem_from_dict, problem_to_dict
@@ -152,7 +157,7 @@ def files_of(
     own = f"meshes of {robot.urdf.sha256} in {robot.urdf.package_dirs}"
     if own not in known:
         known[own] = mesh_digests(robot.urdf, "collision")
-    apart, others = said_once(constraints, None)[::-1]
+    apart, others = separate_clearances(constraints, None)[::-1]
     # Not by the requirement of a clearance, which makes bodies: a good part of a second.
     bodies = [body for item in apart for body in item.obstacles]
     bodies += [body for item in others for body in item.requirement(robot).obstacles]

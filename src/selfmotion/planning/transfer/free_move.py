@@ -30,7 +30,7 @@ from selfmotion.problem.constraints import (
     NO_OVERLAP,
     Clearance,
     Constraint,
-    said_once,
+    separate_clearances,
 )
 from selfmotion.problem.problem import KEPT, check_all_times
 
@@ -96,7 +96,7 @@ def move(
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     listed = as_several(constraints, "constraints", Constraint)
     check_all_times(listed, "the ends of a move are first and last; leave it out")
-    others, apart = said_once(listed, clearance)
+    others, apart = separate_clearances(listed, clearance)
     if len(others) < len(listed):
         warn(MOVED_CLEARANCE.format("move"), FormerUseWarning, stacklevel=2)
     conditions = [item for item in (*others, *apart) if item.applies(robot)]

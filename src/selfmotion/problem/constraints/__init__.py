@@ -24,7 +24,7 @@ from selfmotion.problem.constraints.clearance import (
     Clearance as Clearance,
     as_clearances as as_clearances,
     clearances_among as clearances_among,
-    said_once as said_once,
+    separate_clearances as separate_clearances,
 )
 from selfmotion.problem.constraints.conditions import (
     BoundConstraint as BoundConstraint,

@@ -197,7 +197,7 @@ def without_clearances(constraints: Sequence[Constraint]) -> tuple[Constraint, .
     return tuple(item for item in constraints if not isinstance(item, Clearance))
 
 
-def said_once(
+def separate_clearances(
     constraints: Sequence[Constraint], clearance: Any
 ) -> tuple[tuple[Constraint, ...], tuple[Clearance, ...]]:
     """Return constraints without clearances, and all clearances.

@@ -41,7 +41,7 @@ from selfmotion.problem.constraints import (
     Constraint,
     Envelope,
     as_clearances,
-    said_once,
+    separate_clearances,
 )
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
@@ -170,7 +170,7 @@ class Problem:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
-        constraints, clearances = said_once(self.constraints, self.clearance)
+        constraints, clearances = separate_clearances(self.constraints, self.clearance)
         if len(constraints) < len(self.constraints):
             object.__setattr__(self, "constraints", constraints)
             # Of who called the class.

@@ -13,7 +13,7 @@ from selfmotion.model.motion import NullMotion
 from selfmotion.model.path import Path
 from selfmotion.model.robot import LIMITS, RobotModel, rebuild_robot
 from selfmotion.model.task import Damping, Relaxation, Task
-from selfmotion.problem.constraints import NO_OVERLAP, Constraint, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, Constraint, separate_clearances
 from selfmotion.problem.costs import cost_from_dict
 from selfmotion.problem.problem.problem import Problem
 
@@ -108,7 +108,7 @@ def problem_from_dict(
     if isinstance(described, list):
         given = [_once(known, item, partial(restore, Constraint, item)) for item in described]
     # Files of former versions have clearances among the constraints.
-    constraints, clearances = said_once(constraints, given or None)
+    constraints, clearances = separate_clearances(constraints, given or None)
     return Problem(
         robot,
         restore(Path, values["path"]),

@@ -70,14 +70,14 @@ def export(
     asked = outputs.program_settings(settings, targets, wobj, mass)
     files = _Files(tuple(out), form, asked, parts, force, verbose or as_json)
     files.check(rate, settings, {"targets": targets, "wobj": wobj, "mass": mass})
-    made = _loaded(file, parts=parts)
-    _check_verified(made, force, as_json)
-    _print_followers(made.robot, out, form)
-    outputs.print_base(made.robot, asked)
-    if isinstance(made, sm.Plan) and files.are_readable:
-        made = _slow_enough(made, rate)
-    coarsest = _coarsest(files, made, rate)
-    each = [files.write(made, target, rate, coarsest) for target in out]
+    planned = _loaded(file, parts=parts)
+    _check_verified(planned, force, as_json)
+    _print_followers(planned.robot, out, form)
+    outputs.print_base(planned.robot, asked)
+    if isinstance(planned, sm.Plan) and files.are_readable:
+        planned = _slow_enough(planned, rate)
+    coarsest = _coarsest(files, planned, rate)
+    each = [files.write(planned, target, rate, coarsest) for target in out]
     sound = all(kept for kept, _ in each)
     verdicts = {name: text for _, written in each for name, text in written.items()}
     streamed = [target for target in out if not files.is_program(target)]
@@ -85,28 +85,28 @@ def export(
         rate = coarsest if rate is None else rate
     if coarsest is not None and not as_json:
         terminal.print(reread.coarsest_text(coarsest), markup=False, soft_wrap=True)
-    _print_held(made.robot)
-    _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
+    _print_held(planned.robot)
+    _finish(planned, rate, verdicts, sound, as_json, sampled=bool(streamed))
 
 
-def _coarsest(files: "_Files", made: reread.Made, rate: float | None) -> float | None:
+def _coarsest(files: "_Files", planned: reread.Planned, rate: float | None) -> float | None:
     """Return the rate of messages that keeps a plan, where none is asked for; else None."""
-    if rate is None and files.are_messages and isinstance(made, sm.Plan):
-        return controllers.coarsest_rate(made)
+    if rate is None and files.are_messages and isinstance(planned, sm.Plan):
+        return controllers.coarsest_rate(planned)
     return None
 
 
-def _loaded(file: Path, *, parts: bool) -> reread.Made:
+def _loaded(file: Path, *, parts: bool) -> reread.Planned:
     """Return what a file holds: a program, parts, a move or a plan, the one that has `parts`."""
-    made = _read(file)
-    if parts and not isinstance(made, sm.Plan):
+    planned = _read(file)
+    if parts and not isinstance(planned, sm.Plan):
         raise sm.errors.ProblemError(
             f"{file}: --parts is of a cell's plan, which this is not; leave it out"
         )
-    return made
+    return planned
 
 
-def _read(file: Path) -> reread.Made:
+def _read(file: Path) -> reread.Planned:
     if file.suffix == jobs.PROGRAM:
         return sm.load_program(file)
     if file.suffix == jobs.PARTS:
@@ -177,7 +177,7 @@ class _Files:
         return any(reread.is_readable(target, self.form) for target in self.targets)
 
     def write(
-        self, made: reread.Made, target: Path, rate: float | None, coarsest: float | None
+        self, planned: reread.Planned, target: Path, rate: float | None, coarsest: float | None
     ) -> tuple[bool, dict[str, str]]:
         """Write a file, and one for each part; return whether all is kept, and verdicts by name."""
         given: dict[str, Any] = {"format": self.form, "force": self.force}
@@ -186,24 +186,24 @@ class _Files:
             is_message = reread.is_message(target, self.form)
             given["rate"] = coarsest if rate is None and is_message else rate
         together: dict[str, Path] = {}
-        if self.parts and sampled and isinstance(made, sm.Plan):
-            together = sm.files.write_parts(made, target, **given)
+        if self.parts and sampled and isinstance(planned, sm.Plan):
+            together = sm.files.write_parts(planned, target, **given)
         own = self.asked if reread.is_of_controller(target, self.form) else None
         # What only programs of targets are asked for is not of a stream of samples beside them.
         if own is not None and sampled and any(map(self.is_program, self.targets)):
             own = own.streamed
         with StageDisplay(stages) as display:
-            sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
+            sm.files.write_motion(planned, target, settings=own, progress=display.stage, **given)
         sound, verdict = reread.read_back(
-            made, target, self.form, rate, self.asked, whole=self.whole
+            planned, target, self.form, rate, self.asked, whole=self.whole
         )
         verdicts = {str(target): verdict}
-        if together and isinstance(made, sm.Plan):
+        if together and isinstance(planned, sm.Plan):
             names = ", ".join(map(str, together.values()))
             verdicts[names] = ""
             if reread.is_readable(target, self.form):
                 motion = sm.files.read_parts(together)
-                kept, verdicts[names] = reread.judged(made, motion, whole=self.whole)
+                kept, verdicts[names] = reread.judged(planned, motion, whole=self.whole)
                 sound &= kept
         return sound, verdicts
 
@@ -245,16 +245,16 @@ def _print_held(robot: sm.RobotModel) -> None:
         stages.print(f"note: {text}", markup=False, soft_wrap=True)
 
 
-def _check_verified(made: reread.Made, force: bool, as_json: bool) -> None:
+def _check_verified(planned: reread.Planned, force: bool, as_json: bool) -> None:
     """End with one line where a motion is not verified, or moves at an end, and is not forced."""
     if force:
         return
-    if reread.verified(made):
-        verdict = controllers.moving_ends(made)
+    if reread.verified(planned):
+        verdict = controllers.moving_ends(planned)
         if not verdict:
             return
     else:
-        verdict = made.certificate.verdict if isinstance(made, sm.Plan) else made.verdict
+        verdict = planned.certificate.verdict if isinstance(planned, sm.Plan) else planned.verdict
     if as_json:
         print_json({"verified": False, "written": {}, "verdict": verdict})
     else:
@@ -264,7 +264,7 @@ def _check_verified(made: reread.Made, force: bool, as_json: bool) -> None:
 
 
 def _finish(
-    made: reread.Made,
+    planned: reread.Planned,
     rate: float | None,
     verdicts: dict[str, str],
     sound: bool,
@@ -274,8 +274,8 @@ def _finish(
 ) -> NoReturn:
     """Print what was written, and end."""
     deviation = None
-    if sampled and isinstance(made, sm.Plan):
-        deviation = controllers.linear_deviation(made, rate)
+    if sampled and isinstance(planned, sm.Plan):
+        deviation = controllers.linear_deviation(planned, rate)
     if as_json:
         data: dict[str, Any] = {"verified": sound, "written": verdicts}
         print_json(data if deviation is None else data | {"linear_miss": deviation._asdict()})

@@ -211,14 +211,14 @@ def listening(address: str) -> Iterator[socket.socket]:
         raise sm.errors.ProblemError(
             f"--listen is '{address}', expected host:port like 127.0.0.1:5005"
         )
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         try:
-            made.bind((host, int(port)))
+            opened.bind((host, int(port)))
         except OSError as error:
             raise sm.errors.ProblemError(
                 f"--listen {address}: {error.strerror or error}"
             ) from error
-        yield made
+        yield opened
 
 
 def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:

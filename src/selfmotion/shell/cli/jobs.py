@@ -257,11 +257,11 @@ def _show_parts(parts: sm.Parts, as_json: bool, verbose: bool, remarks: Sequence
 
 def check(file: Path, as_json: bool, verbose: bool) -> NoReturn:
     """Print what is known of a program or of parts, read and judged anew, and end."""
-    made: sm.Program | sm.Parts
+    planned: sm.Program | sm.Parts
     if file.suffix == PARTS:
-        made = sm.files.load_parts(file)
-        _show_parts(made, as_json, verbose)
+        planned = sm.files.load_parts(file)
+        _show_parts(planned, as_json, verbose)
     else:
-        made = sm.load_program(file)
-        _show(made, as_json, verbose)
-    raise typer.Exit(VERIFIED if made.verified else NOT_VERIFIED)
+        planned = sm.load_program(file)
+        _show(planned, as_json, verbose)
+    raise typer.Exit(VERIFIED if planned.verified else NOT_VERIFIED)

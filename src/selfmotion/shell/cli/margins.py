@@ -154,19 +154,19 @@ def sheet(
     """Write a process sheet: motion, limits kept and margins, to print on A4."""
     within = _process(tolerance, turn)
     found: sm.margins.Margins | dict[str, sm.margins.Margins] | None = None
-    made: sm.Plan | sm.Program
+    planned: sm.Plan | sm.Program
     if file.suffix == ".program":
-        made = sm.load_program(file)
-        known = {name: plan for name, plan in made.plans.items() if _has_margins(plan, within)}
+        planned = sm.load_program(file)
+        known = {name: plan for name, plan in planned.plans.items() if _has_margins(plan, within)}
         found = _measured(known, within, {"part": part or None})
     else:
-        made = sm.load_plan(file)
-        if _has_margins(made, within):
+        planned = sm.load_plan(file)
+        if _has_margins(planned, within):
             with StageDisplay(stages) as display:
                 display.stage("measuring margins", 1, 1)
-                found = sm.margin(made, within, part=part or None)
+                found = sm.margin(planned, within, part=part or None)
     written = sm.files.write_sheet(
-        made, out, found, title=title, part_number=part_number, order_number=order_number
+        planned, out, found, title=title, part_number=part_number, order_number=order_number
     )
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
 

@@ -230,10 +230,10 @@ def is_motion(file: Path) -> bool:
     return file.suffix in controllers.SUFFIXES and file.suffix != ".npz"
 
 
-def left_out(made: sm.Plan | sm.Parts | sm.Program) -> str:
+def left_out(planned: sm.Plan | sm.Parts | sm.Program) -> str:
     """Return why a motion is given to no controller, "" where nothing speaks against it."""
-    verified = made.certificate.verified if isinstance(made, sm.Plan) else made.verified
-    return controllers.moving_ends(made) if verified else "it is not verified"
+    verified = planned.certificate.verified if isinstance(planned, sm.Plan) else planned.verified
+    return controllers.moving_ends(planned) if verified else "it is not verified"
 
 
 def print_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:

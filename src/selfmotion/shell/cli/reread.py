@@ -8,7 +8,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.shop import controllers
 
-Made = sm.Plan | sm.Parts | sm.Move | sm.Program
+Planned = sm.Plan | sm.Parts | sm.Move | sm.Program
 
 
 def is_message(target: Path, form: str | None) -> bool:
@@ -37,7 +37,7 @@ def is_readable(target: Path, form: str | None) -> bool:
 
 
 def read_back(
-    made: Made,
+    planned: Planned,
     target: Path,
     form: str | None,
     rate: float | None,
@@ -50,23 +50,25 @@ def read_back(
     The `whole` verdict, or its summary.
     """
     if is_program(target, form, asked) and target.suffix.lower() in controllers.READ_PROGRAMS:
-        return _confirmed(made, target)
+        return _confirmed(planned, target)
     if not is_readable(target, form):
-        return verified(made), ""
+        return verified(planned), ""
     motion = sm.files.read_motion(target)
-    match made:
+    match planned:
         case sm.Plan():
-            return judged(made, motion, whole=whole)
+            return judged(planned, motion, whole=whole)
         case sm.Move():
-            read = sm.Move(made.robot, made.constraints, motion.of_joints(made.robot.joint_names))
-            return read.verified and made.verified, f"read back: {read.verdict}"
+            read = sm.Move(
+                planned.robot, planned.constraints, motion.of_joints(planned.robot.joint_names)
+            )
+            return read.verified and planned.verified, f"read back: {read.verdict}"
         case sm.Program() | sm.Parts() if rate is not None:
             # Steps meet between its samples: there is no motion of each that rests at its ends.
-            return verified(made), _samples_text(made.trajectory, motion, rate)
+            return verified(planned), _samples_text(planned.trajectory, motion, rate)
         case sm.Program():
-            found = controllers.judged_motion(motion, made)
+            found = controllers.judged_motion(motion, planned)
             return found.verified, f"read back: {found.verdict}"
-    return _judged_parts(made, motion, whole=whole)
+    return _judged_parts(planned, motion, whole=whole)
 
 
 def _samples_text(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
@@ -79,28 +81,28 @@ def _samples_text(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> st
     )
 
 
-def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
+def _judged_parts(planned: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
     """Return whether a motion is still that of parts, part by part and move by move."""
-    every = motion.of_joints(made.robot.joint_names)
-    stops = np.append(made.begins, made.trajectory.duration)
+    every = motion.of_joints(planned.robot.joint_names)
+    stops = np.append(planned.begins, planned.trajectory.duration)
     plans, moves = [], []
-    for k, (plan, begin) in enumerate(zip(made.plans, made.begins, strict=True)):
+    for k, (plan, begin) in enumerate(zip(planned.plans, planned.begins, strict=True)):
         end = begin + plan.trajectory.duration
         read = replace(plan, trajectory=controllers.part_of(every, begin, end))
         plans.append(replace(read, certificate=read.check()))
-        if k < len(made.moves):
+        if k < len(planned.moves):
             after = stops[k + 1]
             part = controllers.part_of(every, end, float(after))
-            moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
-    found = replace(made, plans=tuple(plans), moves=tuple(moves))
+            moves.append(sm.Move(planned.robot, planned.moves[k].constraints, part))
+    found = replace(planned, plans=tuple(plans), moves=tuple(moves))
     return found.verified, _verdict_text(found, whole)
 
 
-def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
+def _confirmed(planned: Planned, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
-    read = controllers.read_program(target, made.robot)
-    count, stated, found = controllers.program_deviation(made, target, read)
-    told, kept = [], verified(made) and controllers.keeps_stated(found, stated)
+    read = controllers.read_program(target, planned.robot)
+    count, stated, found = controllers.program_deviation(planned, target, read)
+    told, kept = [], verified(planned) and controllers.keeps_stated(found, stated)
     for deviation, said, where in zip(
         found, stated, ("off the plan", "in free moves"), strict=True
     ):
@@ -111,7 +113,7 @@ def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
                 f"{1e3 * deviation.position:.3g} mm and {deviation.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = controllers.switching_faults(read, made)
+    switched = controllers.switching_faults(read, planned)
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
     remark, at_feeds = read.remark, read.within is not None
@@ -122,9 +124,9 @@ def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
     return kept, f"read back: {'; '.join((f'{count} {targets}{far}', *paced, *why, *switched))}"
 
 
-def verified(made: Made) -> bool:
+def verified(planned: Planned) -> bool:
     """Whether what was made is verified."""
-    return made.certificate.verified if isinstance(made, sm.Plan) else made.verified
+    return planned.certificate.verified if isinstance(planned, sm.Plan) else planned.verified
 
 
 def judged(plan: sm.Plan, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:

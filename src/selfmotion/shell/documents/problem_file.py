@@ -34,7 +34,7 @@ from selfmotion.problem.constraints import (
     Clearance,
     Constraint,
     clearances_among,
-    said_once,
+    separate_clearances,
 )
 from selfmotion.problem.costs import Cost, FunctionCost
 from selfmotion.problem.problem import Problem
@@ -199,7 +199,7 @@ class _Reader:
                 options["clearance"] = None if one is None else self._clearance(one)
         if clearances_among(options.get("constraints", ())):
             self.notes.append(_MOVED)
-            options["constraints"], options["clearance"] = said_once(
+            options["constraints"], options["clearance"] = separate_clearances(
                 options["constraints"], options.get("clearance", NO_OVERLAP)
             )
         with _named(file, ""):

@@ -23,7 +23,7 @@ from selfmotion.basics import (
 from selfmotion.model.path import Feed, Path, Placed, pose_of, with_run_ups
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, separate_clearances
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents.problem_file import job_of
 from selfmotion.shell.documents.problem_parts import (
@@ -121,7 +121,9 @@ class SeamJob:
 
     def _problem(self, seam: Seam) -> Problem:
         every = (*self.settings["constraints"], *seam.constraints)
-        constraints, clearances = said_once(every, self.settings.get("clearance", NO_OVERLAP))
+        constraints, clearances = separate_clearances(
+            every, self.settings.get("clearance", NO_OVERLAP)
+        )
         found = Problem(
             self.robot,
             seam.path,
@@ -312,9 +314,9 @@ class _Reader:
             if not rows.events:
                 return [], rows.one_way
             options = {key: path[key] for key in ("seam", *_PACED) if key in path}
-            made = read_path(file, **options)
-            events = times_of_events(made, rows)
-            return _after_lead(events, path.get("leads"), made), rows.one_way
+            read = read_path(file, **options)
+            events = times_of_events(read, rows)
+            return _after_lead(events, path.get("leads"), read), rows.one_way
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
 

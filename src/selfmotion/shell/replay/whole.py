@@ -198,27 +198,27 @@ class Whole:
     plans: tuple[tuple[float, str, Plan], ...] = ()
 
     @classmethod
-    def of(cls, made: Program | Parts | Move) -> "Whole":
+    def of(cls, planned: Program | Parts | Move) -> "Whole":
         """Return what a page shows of several steps; PlanError where a move is missing."""
-        motion = made.motion if isinstance(made, Move) else made.trajectory
-        marks = tuple(_marks(made))
+        motion = planned.motion if isinstance(planned, Move) else planned.trajectory
+        marks = tuple(_marks(planned))
         events: tuple[tuple[float, str], ...] = ()
         grows = False
-        if isinstance(made, Program):
-            events = tuple((at, f"{name}: {event}") for at, name, event in made.events)
-            grows = any(step.leaves for step in made.steps)
-            first = made.steps[0].made
+        if isinstance(planned, Program):
+            events = tuple((at, f"{name}: {event}") for at, name, event in planned.events)
+            grows = any(step.leaves for step in planned.steps)
+            first = planned.steps[0].made
             constraints = tuple(first.constraints) if isinstance(first, Move) else ()
-            known = list(made.obstacles)
-        elif isinstance(made, Parts):
-            constraints, known = made.problem.all_constraints, list(made.plans[0].obstacles)
+            known = list(planned.obstacles)
+        elif isinstance(planned, Parts):
+            constraints, known = planned.problem.all_constraints, list(planned.plans[0].obstacles)
         else:
-            constraints, known = made.constraints, list(made.obstacles)
+            constraints, known = planned.constraints, list(planned.obstacles)
         unique = {item.name: item for item in known}
-        plan = stand_in(made.robot, motion, constraints)
+        plan = stand_in(planned.robot, motion, constraints)
         standing = tuple(unique.values())
-        plans = tuple(_plans(made))
-        return cls(plan, marks, made.verdict, made.verified, events, standing, grows, plans)
+        plans = tuple(_plans(planned))
+        return cls(plan, marks, planned.verdict, planned.verified, events, standing, grows, plans)
 
     @property
     def points(self) -> int:
@@ -361,26 +361,28 @@ def unproved(problem: Problem, motion: Trajectory, words: str = "") -> Plan:
     return Plan(problem, motion, motion, np.zeros(0), report, certificate)
 
 
-def _plans(made: Program | Parts | Move) -> Iterator[tuple[float, str, Plan]]:
-    if isinstance(made, Program):
-        for begin, step in zip(made.begins, made.steps, strict=True):
+def _plans(planned: Program | Parts | Move) -> Iterator[tuple[float, str, Plan]]:
+    if isinstance(planned, Program):
+        for begin, step in zip(planned.begins, planned.steps, strict=True):
             if isinstance(step.made, Plan):
                 yield begin, step.name, step.made
-    elif isinstance(made, Parts):
-        for number, (begin, plan) in enumerate(zip(made.begins, made.plans, strict=True), 1):
+    elif isinstance(planned, Parts):
+        for number, (begin, plan) in enumerate(zip(planned.begins, planned.plans, strict=True), 1):
             yield begin, f"part {number}", plan
 
 
-def _marks(made: Program | Parts | Move) -> Iterator[Mark]:
-    if isinstance(made, Move):
-        yield Mark(0.0, made.motion.duration, "move", False)
+def _marks(planned: Program | Parts | Move) -> Iterator[Mark]:
+    if isinstance(planned, Move):
+        yield Mark(0.0, planned.motion.duration, "move", False)
         return
-    if isinstance(made, Program):
-        for begin, step in zip(made.begins, made.steps, strict=True):
+    if isinstance(planned, Program):
+        for begin, step in zip(planned.begins, planned.steps, strict=True):
             yield Mark(begin, begin + step.motion.duration, step.name, step.is_seam)
         return
-    for number, (begin, plan) in enumerate(zip(made.begins, made.plans, strict=True), 1):
+    for number, (begin, plan) in enumerate(zip(planned.begins, planned.plans, strict=True), 1):
         end = begin + plan.trajectory.duration
         yield Mark(begin, end, f"part {number}", True)
-        if number <= len(made.moves):
-            yield Mark(end, end + made.moves[number - 1].motion.duration, f"move {number}", False)
+        if number <= len(planned.moves):
+            yield Mark(
+                end, end + planned.moves[number - 1].motion.duration, f"move {number}", False
+            )

@@ -38,7 +38,7 @@ figure { margin: 2mm 0; break-inside: avoid } figure svg { width: 100%; max-heig
 
 
 def write_sheet(
-    made: Plan | Program,
+    planned: Plan | Program,
     file: str | Path,
     margins: Margins | Mapping[str, Margins] | None = None,
     *,
@@ -75,18 +75,18 @@ def write_sheet(
     ProblemError
         An argument is of another type, or the file's name does not end in ``.html``.
     """
-    if not isinstance(made, Plan | Program):
-        raise ProblemError(f"write_sheet: {shown(made)}, expected a Plan or a Program")
+    if not isinstance(planned, Plan | Program):
+        raise ProblemError(f"write_sheet: {shown(planned)}, expected a Plan or a Program")
     day = datetime.date.today() if date is None else date
     if not isinstance(day, datetime.date):
         raise ProblemError(f"write_sheet: date is {shown(date)}, expected a datetime.date")
     path = as_path(file)
     if path.suffix != ".html":
         raise ProblemError(f"{path}: expected a name that ends in .html")
-    if isinstance(made, Plan):
-        named, verified, verdict, sections = _of_plan(made, margins)
+    if isinstance(planned, Plan):
+        named, verified, verdict, sections = _of_plan(planned, margins)
     else:
-        named, verified, verdict, sections = _of_program(made, margins)
+        named, verified, verdict, sections = _of_program(planned, margins)
     named = title or named
     labels = {"part": part_number, "order": order_number, "date": day.isoformat()}
     about = " · ".join(f"{label} {text}" for label, text in labels.items() if text)
@@ -94,7 +94,7 @@ def write_sheet(
     body = [f"<h1>{html.escape(named)}</h1>", f'<p class="note">{html.escape(about)}</p>']
     body += [f'<p class="{kind}">{html.escape(verdict)}</p>']
     body += [f"<p>{html.escape(each)}</p>" for each in _sentences(margins)]
-    body += [_picture(made), *(_drawn(section) for section in sections), _RELEASE]
+    body += [_picture(planned), *(_drawn(section) for section in sections), _RELEASE]
     write_text(
         path,
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -172,17 +172,17 @@ _RELEASE = (
 )
 
 
-def _picture(made: Plan | Program) -> str:
+def _picture(planned: Plan | Program) -> str:
     """Return the picture of a motion; nothing where moves are missing."""
-    if isinstance(made, Plan):
-        return _figure(picture(made.robot, made.trajectory, made.obstacles))
-    if not made.steps or any(step.is_missing for step in made.steps):
+    if isinstance(planned, Plan):
+        return _figure(picture(planned.robot, planned.trajectory, planned.obstacles))
+    if not planned.steps or any(step.is_missing for step in planned.steps):
         return ""
     seams = list[tuple[float, float, str]]()
-    for begin, step in zip(made.begins, made.steps, strict=True):
+    for begin, step in zip(planned.begins, planned.steps, strict=True):
         if step.is_seam:
             seams.append((begin, begin + step.duration, seam_color(len(seams))))
-    return _figure(picture(made.robot, made.trajectory, made.obstacles, seams))
+    return _figure(picture(planned.robot, planned.trajectory, planned.obstacles, seams))
 
 
 def _figure(drawing: str) -> str:

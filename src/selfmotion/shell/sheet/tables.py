@@ -91,8 +91,8 @@ def _what_program(program: Program) -> Section:
 
 
 def _seams(program: Program) -> Section:
-    made = zip(program.begins, program.steps, strict=True)
-    seams = [(begin, step, step.made) for begin, step in made if isinstance(step.made, Plan)]
+    timed = zip(program.begins, program.steps, strict=True)
+    seams = [(begin, step, step.made) for begin, step in timed if isinstance(step.made, Plan)]
     rows = [
         (
             step.name + (", from its end" if step.turned else ""),

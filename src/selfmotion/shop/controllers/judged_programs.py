@@ -142,13 +142,13 @@ class JudgedProgram(NamedTuple):
 
 def _judged_move(
     name: str,
-    made: Move,
+    move: Move,
     motions: Sequence[Trajectory],
     judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
 ) -> JudgedStep:
     """Return the verdict on a move by each interpolation: the first that fails."""
-    smooth, lines = judged(made.constraints), constraints_of_lines(judged(made.constraints))
-    moves = [Move(made.robot, lines if k else smooth, motion) for k, motion in enumerate(motions)]
+    smooth, lines = judged(move.constraints), constraints_of_lines(judged(move.constraints))
+    moves = [Move(move.robot, lines if k else smooth, motion) for k, motion in enumerate(motions)]
     worst = next((move for move in moves if not move.verified), moves[0])
     interpolation = "" if worst is moves[0] else _STRAIGHT
     return JudgedStep(name, worst.verified, f"{worst.verdict}{interpolation}")
@@ -341,13 +341,13 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     return replace(problem, path=path, start=start)
 
 
-def switching_faults(program: ControllerProgram, made: object) -> tuple[str, ...]:
+def switching_faults(program: ControllerProgram, planned: object) -> tuple[str, ...]:
     """Return the differences between the outputs of a controller's program and its job's events.
 
     A plan, parts or a move have no events.
     """
-    if isinstance(made, Program):
-        return tuple(_otherwise_switched(made, program))
+    if isinstance(planned, Program):
+        return tuple(_otherwise_switched(planned, program))
     return tuple(
         f"'{switch.output}' is switched at {switch.at:.4f} s, and the motion has no events"
         for switch in program.switches
@@ -398,15 +398,15 @@ def _judged_steps(
     """Return the certificates of the motions of a job's steps, by the limits that are `judged`."""
     found, checked = list[JudgedStep](), list[CheckedMotion]()
     for step, own in zip(job.steps, motions, strict=True):
-        made = step.made
-        if isinstance(made, Move):
-            found.append(_judged_move(step.name, made, own, judged))
+        planned = step.made
+        if isinstance(planned, Move):
+            found.append(_judged_move(step.name, planned, own, judged))
         else:
-            problem = replace(made.problem, constraints=judged(made.problem.constraints))
+            problem = replace(planned.problem, constraints=judged(planned.problem.constraints))
             if program is not None:
                 problem = as_shifted(problem, program, own[0].q[0])
             lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
-            tolerance = within or made.tolerance
+            tolerance = within or planned.tolerance
             certificate, _ = judged_interpolations(
                 own,
                 partial(problem.certify, tolerance=tolerance),
@@ -439,15 +439,15 @@ def _elsewhere(
 def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[str]:
     """Yield what of a job's events a program does not switch, or switches otherwise."""
     events = sorted(job.events, key=lambda event: event[0])
-    made = sorted(program.switches, key=lambda switch: switch.at)
+    switched = sorted(program.switches, key=lambda switch: switch.at)
     stated = None if program.facts is None else program.facts.outputs
     if events and stated is None:
         yield "its head does not say which output each event switches: write the program again"
-    if len(events) != len(made):
-        yield f"it switches {len(made)} times, the job {len(events)} times"
+    if len(events) != len(switched):
+        yield f"it switches {len(switched)} times, the job {len(events)} times"
         return
     known: dict[str, Switch] = {}
-    for (at, seam, event), switch in zip(events, made, strict=True):
+    for (at, seam, event), switch in zip(events, switched, strict=True):
         if abs(at - switch.at) > _PROMPT:
             yield (
                 f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "

@@ -102,8 +102,8 @@ def drafted(
             why = why or otherwise.why
     if frames is not None and not why:
         try:
-            made = PoseSection if settings.targets == "timed-poses" else paced_section
-            posed: PosedSections = partial(made, frames=frames, rounding=ROUNDINGS[form])
+            section = PoseSection if settings.targets == "timed-poses" else paced_section
+            posed: PosedSections = partial(section, frames=frames, rounding=ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
             segments, deviation = segments_of(*given, posed)

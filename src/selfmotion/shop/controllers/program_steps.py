@@ -65,8 +65,8 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
                 f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
                 f"{step.motion.duration:.6g} s: it is of another one"
             )
-        own, made = part(taken), step.made
-        path = None if isinstance(made, Move) else made.problem.path
+        own, planned = part(taken), step.made
+        path = None if isinstance(planned, Move) else planned.problem.path
         found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
         # Where the arm rests, it is where the poses around have it.
         moving = [item for item in taken if not item.is_rest]

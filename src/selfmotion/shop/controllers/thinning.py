@@ -82,11 +82,11 @@ def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
             return found
     found = []
     for step in plan.steps:
-        made = step.made
+        planned = step.made
         operation = (
-            _plan_operation(step.name, made)
-            if isinstance(made, Plan)
-            else _move_operation(step.name, made)
+            _plan_operation(step.name, planned)
+            if isinstance(planned, Plan)
+            else _move_operation(step.name, planned)
         )
         found.append(operation._replace(events=tuple((at, name) for name, at in step.happenings)))
     if not found:

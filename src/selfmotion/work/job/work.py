@@ -31,7 +31,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import branches, from_start, like_before, near_start
 from selfmotion.planning.result import ArmCache, Move, Plan, load_move, load_plan
 from selfmotion.planning.transfer import FreeMotions, constraints_of_moves
-from selfmotion.problem.constraints import Clearance, Constraint, said_once
+from selfmotion.problem.constraints import Clearance, Constraint, separate_clearances
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import (
     Problem,
@@ -95,7 +95,7 @@ class JobSettings:
     def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
         """Return the problem of a seam, with further obstacles."""
         every = (*self.constraints, *seam.constraints)
-        constraints, clearances = said_once(every, self.clearance_from(obstacles))
+        constraints, clearances = separate_clearances(every, self.clearance_from(obstacles))
         given = Problem(
             self.robot,
             seam.path,

@@ -28,7 +28,7 @@ from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
-from selfmotion.problem.constraints import Clearance, said_once
+from selfmotion.problem.constraints import Clearance, separate_clearances
 from selfmotion.problem.problem import Problem, check_problem
 from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
 
@@ -230,7 +230,9 @@ class _MarginSearch:
             progress("margin", number + 1, _ROUNDS)
             clearances = _adjusted(self.now.clearances, self.now.found, clearance)
             # Pairs of bodies take the place of the default.
-            _, raised_clearances = said_once(_of_pairs(problem, clearances), narrow.clearance)
+            _, raised_clearances = separate_clearances(
+                _of_pairs(problem, clearances), narrow.clearance
+            )
             raised = narrow.changed(clearance=raised_clearances)
             again = plan(raised, warm_start=self.now.plan, **options)
             if not number and not _is_interrupted(again):
