@@ -54,7 +54,7 @@ def page(tmp_path_factory):
 
 def planned(page):
     """Return the message of what is planned in the end."""
-    number = page.session._number
+    number = page.session._revision
     return page.until(lambda found: found["number"] == number and found["kind"] in PLANNED)
 
 

@@ -25,7 +25,7 @@ def page(tmp_path_factory):
 
 def last(page):
     """Return the plan that is shown, when nothing is left to be planned."""
-    page.answer(page.session._number)
+    page.answer(page.session._revision)
     return page.session.found.plan
 
 
@@ -67,7 +67,7 @@ def test_sliders_set_what_is_planned(page):
 
 def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     page.drag("path", moved(x=3.0))
-    found = page.answer(page.session._number)
+    found = page.answer(page.session._revision)
     assert found["kind"] == "none"
     assert found["words"].startswith("not verified: ")
     assert "no configuration" in found["words"]
@@ -119,7 +119,7 @@ def test_a_drag_ends_with_its_last_request(page):
     for _ in range(10):
         page.drag("path", moved(y=0.002), final=False)
     page.drag("path", moved(y=-0.02))
-    number = page.session._number
+    number = page.session._revision
     assert page.answer(number)["number"] == number
     assert not any(
         one["number"] > other["number"]
@@ -202,7 +202,7 @@ def test_a_verified_plan_is_exported(page, tmp_path):
     page.drag("path", moved(x=3.0))
     with pytest.raises(PlanError, match=r"is being planned|nothing is exported"):
         page.session.export(".csv")
-    page.answer(page.session._number)
+    page.answer(page.session._revision)
     with pytest.raises(PlanError, match="nothing is exported until it is verified"):
         page.session.export(".csv")
     page.session.answer({"do": "undo"})
@@ -262,7 +262,7 @@ def test_a_fault_of_the_program_ends_no_session(monkeypatch, tmp_path, capsys):
         with monkeypatch.context() as patched:
             patched.setattr("selfmotion.shell.view.planning.plan", broken)
             page.drag("post", moved(x=0.01))
-            found = page.answer(session._number)
+            found = page.answer(session._revision)
         assert "a fault of the program: by zero" in found["words"]
         assert "ZeroDivisionError" in capsys.readouterr().err
         page.drag("post", moved(x=0.01))

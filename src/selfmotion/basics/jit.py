@@ -1,8 +1,7 @@
 """Compiling the numerical kernels with numba: once per machine, announced when it happens.
 
-No two processes compile the same kernel: the second waits for the result of the first, and compiles
-others meanwhile. So a companion process that starts with the largest kernels does about half of the
-work.
+No two processes compile the same kernel: the second one waits for the first, and compiles others in
+the meantime. So a second process that starts with the largest kernels does about half of the work.
 """
 
 import contextlib
@@ -26,15 +25,15 @@ from numba.core import event
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-# Of a wheel for many processors: the one that its kernels are for; `build_kernels.py` writes it.
+# Target processor of the kernels in a prebuilt wheel; written by `build_kernels.py`.
 BUILT_FOR = Path(__file__).parents[1] / "kernels.json"
 
 
 def use_built_kernels(file: Path = BUILT_FOR) -> bool:
-    """Let numba compile and load for the processor that a wheel was built for; return whether.
+    """Make numba use the target processor of a prebuilt wheel; return whether it does.
 
-    Only where this processor has its features, and nobody has chosen another one. Kernels are
-    compiled for this very processor otherwise.
+    Only if this processor has its features, and no other target is configured. Otherwise kernels
+    are compiled for this processor.
     """
     if numba.config.CPU_NAME is not None:
         return False
@@ -53,8 +52,8 @@ def use_built_kernels(file: Path = BUILT_FOR) -> bool:
 use_built_kernels()
 
 
-class _Spent:
-    """Time that compiling and loading took by a clock; within one another it counts once."""
+class _ReentrantTimer:
+    """Time spent compiling and loading, by a clock; nested use counts once."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
@@ -76,7 +75,7 @@ class _Spent:
             self._ended += self._clock() - self._began
 
 
-_spent, _waited = _Spent(time.process_time), _Spent(time.monotonic)
+_spent, _waited = _ReentrantTimer(time.process_time), _ReentrantTimer(time.monotonic)
 
 
 def seconds_of_kernels() -> float:
@@ -90,24 +89,24 @@ def seconds_of_kernels() -> float:
 def seconds_waited_for_kernels() -> float:
     """Return the time [s] that this process has waited for kernels.
 
-    By the clock on the wall, with the time in which another process compiled them. Who says how
-    long work will take leaves that out.
+    By the clock, including the time in which another process compiled them; estimates of remaining
+    time exclude it.
     """
     return _waited.seconds
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no types
-    """Says on the terminal why the first call takes seconds."""
+    """Prints on the terminal why the first call takes seconds."""
 
     def __init__(self) -> None:
-        self._said = False
+        self._is_printed = False
 
     def on_start(self, event: Any) -> None:
         _spent.__enter__()
         _waited.__enter__()
         ours = event.data["dispatcher"].py_func.__module__.startswith("selfmotion")
-        if ours and not self._said:
-            self._said = True
+        if ours and not self._is_printed:
+            self._is_printed = True
             sys.stderr.write(
                 "selfmotion: compiling numerical kernels for this kind of problem, once per "
                 "machine (`selfmotion warm-up` compiles all) …\n"
@@ -139,15 +138,18 @@ def kernel(function: _Function) -> _Function:
             raise
         compiled = numba.njit(cache=False, error_model="numpy")(function)
     else:
-        _forgive(compiled)
+        _make_cache_robust(compiled)
     return compiled
 
 
-def _forgive(compiled: Any) -> None:
-    """Let a cache that is damaged, or on a full disk, cost time instead of the run."""
+def _make_cache_robust(compiled: Any) -> None:
+    """Make a damaged cache, or a full disk, cause compilation and no error.
+
+    Loading also takes the lock between processes, and extends numba's stamp of the sources.
+    """
     cache = compiled._cache
     load, save = cache.load_overload, cache.save_overload
-    turn = contextlib.ExitStack()
+    lock = contextlib.ExitStack()
     # Functions that it calls may be defined later in its module.
     is_stamped = False
 
@@ -155,8 +157,8 @@ def _forgive(compiled: Any) -> None:
         nonlocal is_stamped
         if not is_stamped:
             is_stamped = True
-            kept = cache._cache_file
-            kept._source_stamp = kept._source_stamp, source_stamp(compiled.py_func)
+            file = cache._cache_file
+            file._source_stamp = file._source_stamp, source_stamp(compiled.py_func)
 
     def load_if_possible(*given: Any) -> Any:
         # A damaged file raises any exception of unpickling.
@@ -170,21 +172,21 @@ def _forgive(compiled: Any) -> None:
     def load_or_compile(*given: Any) -> Any:
         with _spent, _waited:
             stamp()
-            return load_in_turn(*given)
+            return load_locked(*given)
 
-    def load_in_turn(*given: Any) -> Any:
+    def load_locked(*given: Any) -> Any:
         found = load_if_possible(*given)
         if found is None:
             # After an interruption the lock is still held.
-            turn.close()
-            turn.enter_context(_turn(cache))
+            lock.close()
+            lock.enter_context(_compile_lock(cache))
             found = load_if_possible(*given)
         if found is not None:
-            turn.close()
+            lock.close()
         return found
 
     def save_if_possible(*given: Any) -> None:
-        with turn, contextlib.suppress(OSError):
+        with lock, contextlib.suppress(OSError):
             save(*given)
 
     cache.load_overload, cache.save_overload = load_or_compile, save_if_possible
@@ -210,7 +212,7 @@ def _collect(function: Any, files: set[str], constants: list[str], seen: set[obj
     seen.add(function)
     files.add(function.__code__.co_filename)
     package, names = function.__module__.partition(".")[0], _names(function.__code__)
-    # In modules that it names, what it names as well.
+    # Also attributes of our modules that the code uses.
     found = {name: function.__globals__[name] for name in names & function.__globals__.keys()}
     for module in [x for x in found.values() if isinstance(x, ModuleType)]:
         if module.__name__.partition(".")[0] == package:
@@ -243,17 +245,17 @@ _meanwhile: list[Callable[[], object]] = []
 
 
 def meanwhile(work: Callable[[], object]) -> Callable[[], object]:
-    """Register a small piece of work for the time of waiting for another process.
+    """Register a function to call while waiting for another process.
 
-    It calls kernels that are needed soon, as they are called at all: they are compiled by then.
+    It calls kernels that are needed soon, and so compiles them.
     """
     _meanwhile.append(work)
     return work
 
 
 @contextlib.contextmanager
-def _turn(cache: Any) -> Iterator[None]:
-    """Wait until no other process compiles the same kernel; a turn ends with its process."""
+def _compile_lock(cache: Any) -> Iterator[None]:
+    """Wait until no other process compiles the same kernel; the lock ends with its process."""
     with contextlib.ExitStack() as opened:
         if sys.platform != "win32":
             import fcntl
@@ -302,35 +304,34 @@ def companion(works: str) -> "subprocess.Popen[str] | None":
 
 
 def compile_alone() -> None:
-    """Start no other process when something is compiled, and say nothing of it."""
+    """Start no other process when something is compiled, and print nothing."""
     global _IS_ALONE
     _IS_ALONE = True
     event.unregister("numba:compile", _announcement)
 
 
 def inlined(function: _Function) -> _Function:
-    """Make a small numeric function one that kernels can call: LLVM puts it into each of them.
+    """Make a small numeric function callable from kernels, always inlined by LLVM.
 
-    It has no wrapper for Python, which spares a good part of its compilation; from Python it runs
-    as it is written, uncompiled. Division in kernels follows NumPy.
+    It has no wrapper for Python, which saves much of its compilation; from Python it runs
+    uncompiled. Division in kernels follows NumPy.
     """
     return _callable(function, forced=True)
 
 
 def called(function: _Function) -> _Function:
-    """Make a longer numeric function one that kernels can call.
+    """Make a longer numeric function callable from kernels, inlined where LLVM finds it worthwhile.
 
-    Like `inlined`, but LLVM puts it where that pays: longer ones in each place take seconds to
-    compile, and run no faster.
+    Inlining longer ones everywhere takes seconds to compile, and runs no faster.
     """
     return _callable(function, forced=False)
 
 
 def _callable(function: _Function, *, forced: bool) -> _Function:
-    made: _Function = numba.extending.register_jitable(
+    compiled: _Function = numba.extending.register_jitable(
         error_model="numpy", forceinline=forced, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)
-    return made
+    return compiled
 
 
 _announcement = _Announcement()

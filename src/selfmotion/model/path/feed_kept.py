@@ -1,4 +1,4 @@
-"""Feeds of a path with their errors: given and reached speeds, and limiting causes."""
+"""A feed along a path: where it has to be reached, which speed is, and what limits it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,33 +18,33 @@ _SAME = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FeedKept:
-    """Errors of one of the feeds of a `Feed`, in its intervals.
+    """One of the feeds of a `Feed`, compared with the speeds that the path reaches.
 
-    The feed counts everywhere but in run-up, run-down, rounded corners and turns on the spot; each
-    interval has to reach it.
+    The feed has to be reached everywhere but in run-up, run-down, rounded corners and turns on the
+    spot, and at least once in each of its intervals.
 
     Attributes
     ----------
     asked : float
-        [m/s].
+        The feed [m/s].
     within : float
-        Allowed relative error.
+        Allowed relative error of the speed.
     during : (W, 2)
-        First and last times of its intervals [s].
+        First and last times of the intervals with this feed [s].
     t, speeds : (K,)
-        Times of these [s], and how fast the tool is then [m/s].
+        Sample times in these intervals [s], and the speed of the tool there [m/s].
     lasts : (K,)
-        Duration that each time represents [s].
+        Duration that each sample represents [s].
     counts : (K,)
-        Whether the feed counts at each time.
+        Whether the feed has to be reached at each sample.
     causes : (K,)
-        Limiting cause at each time, in words.
+        What limits the speed at each sample, in words.
     path : Feed
-        The original path at this feed: its own speed between these times.
+        The original path with this feed, which has the speed between the samples.
     own : (K,)
-        The times on that path [s].
+        Times of the samples on that path [s].
     rows : (K,)
-        Their numbers there: consecutive ones are neighbours.
+        Indices of the samples on that path; consecutive ones are neighbours.
     """
 
     asked: float
@@ -66,23 +66,26 @@ class FeedKept:
 
     @property
     def slowest(self) -> float:
-        """Smallest speed where it counts [m/s]; of an interval without any, the largest."""
+        """Smallest speed where the feed has to be reached [m/s].
+
+        Of an interval that is too short for it, the largest speed.
+        """
         return float(self.speeds[self._worst])
 
     @property
     def time(self) -> float:
-        """When that is [s]."""
+        """Time of the slowest speed [s]."""
         return float(self.t[self._worst])
 
     @property
     def slower(self) -> float:
-        """For how long the tool is too slow where it counts [s]."""
+        """Duration for which the tool is too slow where the feed has to be reached [s]."""
         slow = (self.speeds < (1.0 - self.within) * self.asked) & self.counts
         return float(self.lasts @ slow)
 
     @property
     def held_by(self) -> str:
-        """Limiting cause at the slowest time."""
+        """What limits the slowest speed, in words."""
         return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
 
     def named(self, time: float, duration: float) -> str:
@@ -90,23 +93,23 @@ class FeedKept:
         first, last = self.during[int(np.argmin(np.abs(self.during - time).min(axis=1)))]
         ends = 0.0, duration
         whole = len(self.during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
-        stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
-        return f"the feed of {self.asked:g} m/s{stretch}"
+        interval = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
+        return f"the feed of {self.asked:g} m/s{interval}"
 
     @property
     def kept(self) -> bool:
-        """Whether the feed is kept where it counts, and reached at all."""
+        """Whether the feed is reached wherever it has to be."""
         return self.slowest >= (1.0 - self.within) * self.asked
 
     @property
     def left_over(self) -> float:
-        """Allowed difference of the tool's speed from the path's where the feed counts [m/s]."""
+        """Speed margin: how much the tool may differ from the path's speed [m/s]."""
         most = max((1.0 + self.within) * self.asked, self.reached)
         return max(min(most - self.reached, self.slowest - (1.0 - self.within) * self.asked), 0.0)
 
     @cached_property
     def _worst(self) -> int:
-        """Index of the slowest time where it counts; of an interval without any, the fastest."""
+        """Index of the sample with the slowest speed; see `slowest`."""
         chosen = []
         for own in range(len(self.during)):
             here = self._interval == own
@@ -119,19 +122,19 @@ class FeedKept:
 
     @cached_property
     def _interval(self) -> Ints:
-        """Number of each time's interval, (K,)."""
+        """Index of each sample's interval, (K,)."""
         return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
 
     def timed(self, when: Callable[[Array], Array]) -> "FeedKept":
-        """Return the same at other times, given by a function of these."""
+        """Return the same with other times, given by a function of these."""
         during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
         return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
 
     @property
     def pieces(self) -> tuple[Array, Flags]:
-        """The intervals of the path at this feed that are left of it.
+        """Intervals between neighbouring samples, and whether the feed has to be reached there.
 
-        Beginnings and ends [s], (I, 2), and whether the feed counts there, (I,): at both ends.
+        On `path`: (I, 2) [s], and (I,), true where it has to be reached at both ends.
         """
         order = np.argsort(self.rows)
         rows, own, counts = self.rows[order], self.own[order], self.counts[order]
@@ -144,14 +147,14 @@ class FeedKept:
         return self.timed(lambda t: t + seconds)
 
     def between(self, first: float, last: float) -> "FeedKept | None":
-        """Return it between two times [s]; None if it does not count there."""
+        """Return it between two times [s]; None if the feed need not be reached there."""
         found = self.where((self.t >= first) & (self.t <= last))
         return found and replace(found, during=np.clip(found.during, first, last))
 
     def where(self, rows: Flags) -> "FeedKept | None":
-        """Return it at some of the times (K,), without intervals where it counts at none of them.
+        """Return it at samples of a mask (K,); None if the feed need not be reached there.
 
-        None if it counts in no interval.
+        Intervals without a sample where it has to be are left out.
         """
         if rows.all():
             return self

@@ -17,12 +17,12 @@ from selfmotion.problem.constraints import (
     linearised,
 )
 
-# Rows become active where h is above this [units of h]: distances level off there.
-_NEAR = -0.19
-# Share of the unused tolerance that a violation between points may use once intervals are
-# subdivided.
-_ROOM = 0.5
-# Largest number of parts of an interval at once.
+# Rows with h above this enter the active set [units of h]. Residuals of distances level off just
+# below, so that lower ones are all alike.
+_ACTIVE_ABOVE = -0.19
+# Share of the reserved tolerance that a violation between points may use after subdivision.
+_SUBDIVISION_TARGET = 0.5
+# Largest number of parts that an interval is divided into at once.
 _MOST_PARTS = 4
 
 
@@ -55,7 +55,7 @@ class UnitTangents(NodeTangents):
 
 @dataclass(frozen=True, eq=False)
 class PointRows:
-    """Rows of points by y of their intervals.
+    """Derivatives of constraint rows by y, the end states of their interval.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class PointRows:
     by_ends: Array
 
     def along(self, changes: Array) -> Array:
-        """Return ∂h along changes of y (N, 6, n), (R,)."""
+        """Return the directional derivative of h for changes of y (N, 6, n), (R,)."""
         return np.asarray(np.sum(self.by_ends * changes[self.intervals], axis=(1, 2)))
 
     def pulled(self, multipliers: Array, count: int) -> Array:
-        """Return Σ multipliers ∂h/∂y, (count, 6, n)."""
+        """Return the transposed product Σ multipliers ∂h/∂y, (count, 6, n)."""
         found = np.zeros((count, *self.by_ends.shape[1:]))
         np.add.at(found, self.intervals, multipliers[:, None, None] * self.by_ends)
         return found
@@ -129,8 +129,8 @@ class CollocationRows:
         return h - self.item.granted
 
     def near(self, h: Array) -> Flags:
-        """Return the mask of nearly violated rows."""
-        return np.asarray(h > _NEAR)
+        """Return the mask of rows that enter the active set."""
+        return np.asarray(h > _ACTIVE_ABOVE)
 
     @cached_property
     def _units(self) -> UnitTangents:
@@ -151,7 +151,10 @@ class CollocationRows:
     def add_bending(
         self, matrix: NodeMatrix, by: EndChanges, motion: SampledMotion, multipliers: Array
     ) -> None:
-        """Add Σ multipliers · ∂²h/∂w² of rows that are sums of squares."""
+        """Add the rows' second derivatives in the Lagrangian, Σ multipliers · ∂²h/∂w².
+
+        Of rows that are sums of squares.
+        """
         slopes = self.item.squares(motion.seen_by(self.item))
         if slopes is None:
             return
@@ -180,13 +183,13 @@ class CollocationRows:
         if (h <= item.tolerance).all():
             return found
         used = item.granted
-        need = np.sqrt(np.maximum(h - used, 0.0) / (_ROOM * (item.tolerance - used)))
-        # Written so that NaN is divided.
+        need = np.sqrt(np.maximum(h - used, 0.0) / (_SUBDIVISION_TARGET * (item.tolerance - used)))
+        # An interval with NaN, which compares false, is divided.
         need = np.where(h > -np.inf, need, _MOST_PARTS)
         return np.clip(np.ceil(need), 1, _MOST_PARTS).astype(np.int64)
 
     def carried(self, before: "CollocationRows", multipliers: Array) -> Array:
-        """Return the multipliers of these rows by those of the nearest rows before."""
+        """Return multipliers for these rows from those of the nearest points of the grid before."""
         t, known = self._spline.points.t, before._spline.points.t
         right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
         right -= t - known[right - 1] < known[right] - t

@@ -24,12 +24,12 @@ from selfmotion.planning.result.pace_rows import PaceLimits
 from selfmotion.problem.costs import Cost, PlacedLater, Samples
 from selfmotion.problem.problem import Problem
 
-# Share of a limit from which on it is fully used.
+# Share of a limit from which on it counts as fully used.
 FULLY = 0.95
-# Times per sample of the motion that are evaluated …
-_PER_SAMPLE = 3
-# … and their smallest number.
-_FEWEST = 2000
+# Evaluations of limits per sample of the motion.
+_LIMIT_OVERSAMPLING = 3
+# Smallest number of these evaluations.
+_FEWEST_EVALUATIONS = 2000
 _RATES = ("speed", "acceleration", "jerk")
 
 
@@ -40,7 +40,8 @@ class LimitsUsed:
     Attributes
     ----------
     busy : float
-        Share with any limit in use: at 1 the motion is as fast as its joint path allows.
+        Share of the time with any limit fully used; at 1 the motion is as fast as its joint path
+        allows.
     shares : tuple of (str, float)
         Shares by the limit used most, "acceleration of joint 'elbow'"; the longest first.
     """
@@ -50,14 +51,14 @@ class LimitsUsed:
 
     def __str__(self) -> str:
         """Return both in words."""
-        said = f"{self.busy:.1%} of the time"
+        total = f"{self.busy:.1%} of the time"
         if not self.shares:
-            return said
-        return f"{said}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
+            return total
+        return f"{total}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
 
 
 def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
-    """Return the quantities within limits that a slower pace may keep."""
+    """Return the constrained quantities that a slower motion can bring within their limits."""
     kinds = QuantityWithinLimits | VelocityByPosition
     selected = (item.quantity for item in requirements if isinstance(item, kinds))
     return tuple(item for item in selected if item.of_pace and len(item.limited))
@@ -68,8 +69,8 @@ def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
     envelope = problem.envelope
     quantities = quantities_of_pace(problem.requirements)
     limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
-    count = max(_PER_SAMPLE * len(motion.t), _FEWEST)
-    # In the middle of equal parts of the time.
+    count = max(_LIMIT_OVERSAMPLING * len(motion.t), _FEWEST_EVALUATIONS)
+    # Midpoint rule on equal intervals.
     t = motion.t[0] + motion.duration * (np.arange(count) + 0.5) / count
     used = np.concatenate(limits.shares_at(motion, t), axis=1)
     names = [f"{rate} of joint '{name}'" for rate in _RATES for name in motion.joint_names]
@@ -188,15 +189,15 @@ def _samples(follows: Follows, motion: Trajectory) -> Samples:
 
 # Smallest backward motion of a joint that counts as a reversal [rad or m].
 LEAST = 1e-3
-# Times per sample of the motion that are evaluated.
-_BETWEEN = 4
+# Evaluations of joint speeds per sample of the motion.
+_REVERSAL_OVERSAMPLING = 4
 # Bisections of the time of a reversal.
 _HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Reversals:
-    """When the joints of a motion turn round, each by more than 1 mrad or 1 mm.
+    """Times at which joints reverse, each by more than 1 mrad or 1 mm.
 
     Attributes
     ----------
@@ -209,15 +210,15 @@ class Reversals:
     @classmethod
     def of(cls, motion: Trajectory) -> Reversals:
         """Return those of a motion."""
-        shares = np.arange(_BETWEEN) / _BETWEEN
+        shares = np.arange(_REVERSAL_OVERSAMPLING) / _REVERSAL_OVERSAMPLING
         steps = np.diff(motion.t)[:, None] * shares
         t = np.append((motion.t[:-1, None] + steps).ravel(), motion.t[-1])
         speeds = motion(t, 1)
-        turns = {
-            name: read_only(_turns(motion, number, t, speeds[:, number]))
+        reversals = {
+            name: read_only(_reversal_times(motion, number, t, speeds[:, number]))
             for number, name in enumerate(motion.joint_names)
         }
-        return cls(MappingProxyType(turns))
+        return cls(MappingProxyType(reversals))
 
     @property
     def count(self) -> int:
@@ -231,17 +232,17 @@ class Reversals:
         return f"{self.count} ({', '.join(turning)})" if turning else "0"
 
 
-def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:
-    """Return when one joint turns round."""
+def _reversal_times(motion: Trajectory, joint: int, t: Array, speed: Array) -> Array:
+    """Return the times at which a joint with these speeds at t (K,) reverses."""
     moving = np.flatnonzero(speed)
     change = np.flatnonzero(np.diff(np.sign(speed[moving])))
     early, late, sign = t[moving[change]], t[moving[change + 1]], np.sign(speed[moving[change]])
     for _ in range(_HALVINGS):
         middle = 0.5 * (early + late)
-        before = motion(middle, 1)[:, number] * sign > 0.0 if len(middle) else sign > 0.0
+        before = motion(middle, 1)[:, joint] * sign > 0.0 if len(middle) else sign > 0.0
         early, late = np.where(before, middle, early), np.where(before, late, middle)
-    places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, number]
-    # Of turns with less than LEAST in between both go, the nearest first.
+    places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, joint]
+    # Pairs of reversals nearer than LEAST are dropped, the nearest pair first: jitter is none.
     selected = list(range(len(places)))
     while len(selected) > 2:
         lengths = np.abs(np.diff(places[selected]))

@@ -1,4 +1,4 @@
-"""All that a page knows, from plans: see `Payload` for how it travels."""
+"""The JSON content of a replay page, from plans; arrays go into a `Payload`."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ _PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
 
 # Sizes of what is drawn, relative to half the diagonal of the scene.
 _TRACE_RADIUS = 0.005
-# How thick moves are beside seams, which are what a job is about.
+# Thickness of moves relative to seams.
 _THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 _FRAME_LENGTH = 0.12
-# What stands around is in the first view unless it is so much larger than arm and path, as a floor.
-_PART = 2.0
+# Obstacles larger than this multiple of the scene, such as floors, do not enlarge the first view.
+_MAX_OBSTACLE_SIZE = 2.0
 # Points of the curves of a brief page.
-_FEW = 101
+_BRIEF_POINTS = 101
 
 
 class _Tip:
-    """What follows a path, sampled: where it is and was to be, where the path is carried."""
+    """The motion of one tool tip, sampled: actual and prescribed positions, and the carrier."""
 
     def __init__(
         self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None, few: dict[str, int]
@@ -60,8 +60,9 @@ class _Tip:
         self.carrier = follow.chain.carrier
         points = few if whole is None else {"points": whole.points}
         self.shown = curves(plan, plan.trajectory, follow, **points)
-        still = plan.initial_trajectory is plan.trajectory
-        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow, **few)
+        self.start = self.shown
+        if plan.initial_trajectory is not plan.trajectory:
+            self.start = curves(plan, plan.initial_trajectory, follow, **few)
         # The whole path, also where the motion ends before it.
         times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
         base = follow.chain.base_placement
@@ -70,9 +71,9 @@ class _Tip:
 
     @property
     def outline(self) -> list[Array]:
-        """Points of it in world axes; a path that is carried is where the tool is."""
-        still = [self.target] if self.carrier < 0 else []
-        return [self.shown.tool_in_world, *still]
+        """Points of it in world axes; a path that is carried moves with the tool."""
+        fixed = [self.target] if self.carrier < 0 else []
+        return [self.shown.tool_in_world, *fixed]
 
 
 class _Motion:
@@ -85,16 +86,18 @@ class _Motion:
         self.plan, self.whole = plan, whole
         self.maps = maps_of(plan, whole) if with_map else []
         self.frames = key_frames(robot, plan.trajectory)
-        still = plan.initial_trajectory is plan.trajectory
-        self.ghost = self.frames if still else key_frames(robot, plan.initial_trajectory)
-        few = {"points": _FEW} if brief else {}
+        is_minimum_norm = plan.initial_trajectory is plan.trajectory
+        self.ghost = self.frames if is_minimum_norm else key_frames(robot, plan.initial_trajectory)
+        few = {"points": _BRIEF_POINTS} if brief else {}
         self.tips = [_Tip(plan, item, whole, few) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
         self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
-        # How far apart bodies have to be [m].
-        self.asked = max((item.distance for item in plan.problem.clearances), default=0.0)
+        # Largest required distance of bodies [m].
+        self.required_distance = max(
+            (item.distance for item in plan.problem.clearances), default=0.0
+        )
         self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
         self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
 
@@ -110,7 +113,8 @@ def page_content(
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
 
-    `whole` is what the one plan stands for, where it does; maps take seconds, and may be left out.
+    `whole` is the job or the parts whose motion the one plan has; maps, which take seconds, may be
+    left out.
     """
     robot = plans[0].robot
     arm = links.bake(robot, payload)
@@ -121,11 +125,11 @@ def page_content(
         [points for motion in motions for tip in motion.tips for points in tip.outline],
     )
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
-    # A part is seen whole, a floor is not.
+    # Parts are in the first view, floors are not.
     around = [
         corners
         for motion in motions
-        for corners in scene.outlines(motion.obstacles, _PART * box.radius)
+        for corners in scene.outlines(motion.obstacles, _MAX_OBSTACLE_SIZE * box.radius)
     ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
@@ -278,7 +282,7 @@ def _plan(
         },
         "clearance": None
         if motion.clearance is None
-        else _clearance(motion.clearance, payload) | {"asked": motion.asked},
+        else _clearance(motion.clearance, payload) | {"asked": motion.required_distance},
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [

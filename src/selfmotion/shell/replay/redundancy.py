@@ -1,4 +1,4 @@
-"""A plan's redundancy map for a page: colours, reasons, and configurations to stand in."""
+"""A plan's redundancy map for a page: colours, reasons, and the configuration at each pixel."""
 
 from __future__ import annotations
 
@@ -22,22 +22,25 @@ from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.whole import Whole
 
-# Steps of a joint's range, and of the range of costs, in which numbers travel: of a turn 0.1 mrad,
-# of costs less than a shade that can be told from the next.
-_JOINT_STEPS, _COST_STEPS = 2**16 - 1, 2**8 - 1
+# Quantisation of joints: 16 bits of each joint's range, some 0.1 mrad.
+_JOINT_STEPS = 2**16 - 1
+# Quantisation of costs: 8 bits of their range, finer than shades that can be seen.
+_COST_STEPS = 2**8 - 1
 # Numbers of pixels along the path and upwards.
 Pixels = tuple[int, int]
-# Pixels of jobs, of further slices, and where bodies are not convex: searching their surfaces takes
-# twenty times as long as hulls.
+# Pixels of jobs, of further slices, and where bodies are not convex, whose distances take twenty
+# times as long as those of hulls.
 FEWER_PIXELS: Pixels = (61, 61)
-# Slices that a page has at most; seams beyond which none of a job has a map.
-SLICES, MOST_SEAMS = 3, 24
-# Stands for no cause.
+# Largest number of slices of a page.
+SLICES = 3
+# Jobs with more seams have no maps.
+MOST_SEAMS = 24
+# Code of "no cause".
 _NO_CAUSE = 2**16 - 1
 
 
 def tree(robot: RobotModel, payload: Payload) -> Json:
-    """Return what a page needs to put the links where a configuration has them."""
+    """Return the kinematic tree, by which a page places links for a configuration."""
     arrays = robot.tree
     return {
         "coordinates": arrays.joints.tolist(),
@@ -57,11 +60,11 @@ class SeamMaps:
     Attributes
     ----------
     begin : float
-        When the plan begins in what is shown [s].
+        Start of the plan on the time axis of the page [s].
     name : str
         Of the seam; "" for a plan alone.
     maps : tuple of RedundancyMap
-        The first tells most.
+        In the order of `Plan.redundancy_coordinates`.
     """
 
     begin: float
@@ -108,8 +111,8 @@ def packed_maps(seams: Sequence[SeamMaps], payload: Payload) -> list[Json]:
 def packed_map(shown: RedundancyMap, payload: Payload) -> Json:
     """Return the JSON of a map; its arrays go into `payload`.
 
-    Configurations are differences from pixel to pixel upwards on a grid of each joint's range,
-    modulo 2¹⁶; without a configuration they stand still.
+    Joints are coded as differences from pixel to pixel along the coordinate, modulo 2¹⁶; pixels
+    without a configuration have differences of 0.
     """
     scale, unit = shown_scale(shown.unit)
     excess, high = excess_cost(shown.cost, shown.allowed)

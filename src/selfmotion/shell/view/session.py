@@ -1,4 +1,4 @@
-"""A sitting at a page that changes a document while its plan follows."""
+"""Editing a problem document on a page: each change is planned, and the page is updated."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 import numpy as np
 from typing_extensions import override
 
-from selfmotion.basics import PlanError, ProblemError, SelfmotionError, shown as told
+from selfmotion.basics import PlanError, ProblemError, SelfmotionError, shown
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json
@@ -18,23 +18,23 @@ from selfmotion.shell.view.planning import Planning
 from selfmotion.shell.view.sitting import Sitting
 from selfmotion.shell.view.sliders import Slider, sliders_of
 
-# How far a matrix of the page may be from a pose.
+# Largest deviation of a matrix that the page sends from a pose.
 _RIGID = 1e-3
-# No page gives this number to what it asks.
-_NOTHING = -1
+# A request id that no page gives.
+_NO_REQUEST = -1
 
 
 class Session(Sitting):
-    """A document that is changed on a page while its plan follows.
+    """A document that is edited on a page, with the plan of its present state.
 
     Parameters
     ----------
     file : Path
-        A problem file or a job file; or a plan's.
+        A problem file, a job file, or a saved plan.
     edited : Edited, optional
         The document; by default what the file says.
     allow_code : bool
-        Whether code that it names is run.
+        Whether code that the document names is run.
 
     Raises
     ------
@@ -47,20 +47,21 @@ class Session(Sitting):
     ) -> None:
         super().__init__(file)
         self.edited = Edited(file) if edited is None else edited
-        self._begun = dict(self.edited.document)
-        self._number = self._mark = self._drags = 0
-        # The last plan of a document that describes a problem, and what of that can be changed.
-        self._known: Plan | None = None
+        self._initial_document = dict(self.edited.document)
+        # The number of changes, the id of the last request, and the number of drags.
+        self._revision = self._request_id = self._drags = 0
+        # The last plan, and the handles and sliders of its document.
+        self._last_plan: Plan | None = None
         self._handles: dict[str, Handle] = {}
         self._sliders: dict[str, Slider] = {}
         given = None
         if isinstance(self.edited, EditedPlan):
             given = self.edited.document, self.edited.plan
-        self._planning = Planning(file, allow_code, self._take, given)
-        # Before there is a page; what is no problem at all is told at once.
+        self._planning = Planning(file, allow_code, self._on_result, given)
+        # Planned before there is a page, so that an invalid file fails at once.
         first = self._planning.answer(Request(0, self.edited.document))
         self.open(first)
-        self._sliders = sliders_of(self.edited.document, self._begun)
+        self._sliders = sliders_of(self.edited.document, self._initial_document)
         self._planning.start(first)
 
     @property
@@ -72,79 +73,79 @@ class Session(Sitting):
     def close(self) -> None:
         self._planning.close()
 
-    # The page, and what it asks for.
+    # Requests of the page.
 
     @override
     def attach(self, send: Callable[[bytes], None]) -> bool:
         with self._lock:
             if self._send is None:
-                # Another page counts anew.
-                self._mark = 0
+                # A new page starts its request ids at 0.
+                self._request_id = 0
         return super().attach(send)
 
     @override
-    def answer(self, asked: Any) -> Json | None:
-        if not isinstance(asked, Mapping):
-            raise ProblemError(f"the page asks for {told(asked)}, expected a table")
-        mark = asked.get("mark", 0)
-        if isinstance(mark, bool) or not isinstance(mark, int):
-            raise ProblemError(f"mark: is {told(mark)}, expected a whole number")
+    def answer(self, request: Any) -> Json | None:
+        if not isinstance(request, Mapping):
+            raise ProblemError(f"the page asks for {shown(request)}, expected a table")
+        request_id = request.get("mark", 0)
+        if isinstance(request_id, bool) or not isinstance(request_id, int):
+            raise ProblemError(f"mark: is {shown(request_id)}, expected a whole number")
         try:
             with self._lock:
-                is_new, self._mark = mark != self._mark, mark
-                return self._done(asked)
+                is_new, self._request_id = request_id != self._request_id, request_id
+                return self._handle(request)
         except SelfmotionError:
-            # The plan of what was asked for before answers this, too.
+            # Sends the present plan again, so that the page sees its request answered.
             if is_new:
                 self.tell()
             raise
 
-    def _done(self, asked: Mapping[str, Any]) -> Json | None:
-        match asked.get("do"):
+    def _handle(self, request: Mapping[str, Any]) -> Json | None:
+        match request.get("do"):
             case "drag":
-                self._drag(asked)
+                self._drag(request)
             case "slide":
-                self._slide(asked)
+                self._slide(request)
             case "undo":
                 self.edited.undo()
-                self._ask()
+                self._request_plan()
             case "save":
                 self._save()
                 return {"saved": f"Saved {self.edited.saves}.", **self._state()}
             case other:
                 raise ProblemError(
-                    f"the page asks for {told(other)}, expected drag, slide, undo or save"
+                    f"the page asks for {shown(other)}, expected drag, slide, undo or save"
                 )
         return None
 
-    def _drag(self, asked: Mapping[str, Any]) -> None:
-        handle = self._handles.get(str(asked.get("name")))
+    def _drag(self, request: Mapping[str, Any]) -> None:
+        handle = self._handles.get(str(request.get("name")))
         if handle is None:
-            self._refuse(asked, self._handles)
-        values = dragged(self.edited.document, handle, _pose(asked.get("matrix")))
-        final = bool(asked.get("final"))
+            self._refuse(request, self._handles)
+        values = dragged(self.edited.document, handle, _pose(request.get("matrix")))
+        final = bool(request.get("final"))
         self.edited.change(values, final=final)
-        self._ask(None if final else (self._drags, handle.name))
-        self._drags += final
+        self._request_plan(None if final else (self._drags, handle.name))
+        if final:
+            self._drags += 1
 
-    def _slide(self, asked: Mapping[str, Any]) -> None:
-        slider = self._sliders.get(str(asked.get("name")))
+    def _slide(self, request: Mapping[str, Any]) -> None:
+        slider = self._sliders.get(str(request.get("name")))
         if slider is None:
-            self._refuse(asked, self._sliders)
-        value = asked.get("value")
+            self._refuse(request, self._sliders)
+        value = request.get("value")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ProblemError(f"{slider.name}: is {told(value)}, expected a number")
+            raise ProblemError(f"{slider.name}: is {shown(value)}, expected a number")
         if not slider.low <= value <= slider.high:
             raise ProblemError(
-                f"{slider.name}: is {told(value)}, expected {slider.low:g} to {slider.high:g}"
+                f"{slider.name}: is {shown(value)}, expected {slider.low:g} to {slider.high:g}"
             )
-        self.edited.change({slider.keys: float(value)}, final=bool(asked.get("final")))
-        self._ask()
+        self.edited.change({slider.keys: float(value)}, final=bool(request.get("final")))
+        self._request_plan()
 
-    def _refuse(self, asked: Mapping[str, Any], known: Mapping[str, Any]) -> NoReturn:
-        raise ProblemError(
-            f"there is no {told(asked.get('name'))} in this document, which has {', '.join(known)}"
-        )
+    def _refuse(self, request: Mapping[str, Any], known: Mapping[str, Any]) -> NoReturn:
+        name, names = shown(request.get("name")), ", ".join(known)
+        raise ProblemError(f"there is no {name} in this document, which has {names}")
 
     def _save(self) -> None:
         if isinstance(self.edited, EditedPlan):
@@ -156,37 +157,36 @@ class Session(Sitting):
 
     # The planner.
 
-    def _ask(self, drag: tuple[int, str] | None = None) -> None:
-        self._number += 1
-        self._planning.ask(Request(self._number, self.edited.document, drag))
+    def _request_plan(self, drag: tuple[int, str] | None = None) -> None:
+        self._revision += 1
+        self._planning.ask(Request(self._revision, self.edited.document, drag))
 
     @override
     def _state(self) -> Json:
         edited = self.edited
-        self._sliders = sliders_of(edited.document, self._begun)
+        self._sliders = sliders_of(edited.document, self._initial_document)
         return {
             "sliders": [slider.json for slider in self._sliders.values()],
             "changed": edited.is_changed,
             "undo": edited.can_undo,
         }
 
-    def _take(self, found: Found) -> None:
+    def _on_result(self, found: Found) -> None:
         with self._lock:
             self._found = found
             if found.plan is not None:
-                self._known = found.plan
+                self._last_plan = found.plan
                 self._handles = handles_of(found.request.document, found.plan.problem)
         self.tell()
 
     @override
     def _is_current(self, found: Found) -> bool:
-        return super()._is_current(found) and found.request.number == self._number
+        return super()._is_current(found) and found.request.number == self._revision
 
     @override
     def _answered(self, found: Found) -> int:
-        # The last document answers whatever was asked last, whichever page had asked for it; older
-        # ones nothing.
-        return self._mark if found.request.number == self._number else _NOTHING
+        # Only the plan of the latest document answers the latest request.
+        return self._request_id if found.request.number == self._revision else _NO_REQUEST
 
 
 def _pose(matrix: Any) -> SE3:
@@ -194,10 +194,10 @@ def _pose(matrix: Any) -> SE3:
     try:
         values = np.array(matrix, dtype=np.float64).reshape(4, 4).T
     except (TypeError, ValueError, OverflowError):
-        raise ProblemError(f"matrix: is {told(matrix)}, expected 16 numbers") from None
+        raise ProblemError(f"matrix: is {shown(matrix)}, expected 16 numbers") from None
     turn = values[:3, :3]
     off = np.abs(turn @ turn.T - np.eye(3)).max()
     if not np.all(np.isfinite(values)) or off > _RIGID or np.linalg.det(turn) < 0.0:
-        raise ProblemError(f"matrix: is {told(matrix)}, expected that of a pose")
+        raise ProblemError(f"matrix: is {shown(matrix)}, expected that of a pose")
     left, _, right = np.linalg.svd(turn)
     return SE3(left @ right, values[:3, 3])

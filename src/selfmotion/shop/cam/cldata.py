@@ -1,4 +1,4 @@
-"""Cutter location data as APT writes it, ISO 4343: the statements that say where a tool goes."""
+"""Cutter location data in APT's format (ISO 4343): motion statements, feeds, arcs and cycles."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -20,16 +20,16 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:E[+-]?[0-9]{1,2})?")
 # Longest statement [characters].
 _LONGEST = 10_000
 _UNITS = {"MM": _MM, "INCH": _INCH, "INCHES": _INCH}
-# Feeds by the minute: all others are by turn or time.
+# Units of feeds per minute; other units, such as per turn, are not read.
 _FEEDS = {"MMPM": _MM, "IPM": _INCH, "PERMIN": None}
-# Words that move nothing: names, the cutter's shape, tolerances of what is done already.
-_NOTHING = (
+# Statements without effect on the motion: names, the cutter's shape, tolerances.
+_IGNORED = (
     *("MACHIN", "CUTTER", "INTOL", "OUTTOL", "TOLER", "TLDATA", "SELECTL", "TOOLNO", "MULTAX"),
     *("PAINT", "SEQNO", "SELECT", "AUTOPS", "CLPRNT", "NOPOST", "REWIND"),
 )
-# Statements of which some move nothing, and these.
+# Statements that are ignored with these arguments only.
 _HARMLESS = {"MODE": ("ABSOL", "MILL"), "SET": ("MODE,ABSOL", "MODE,MILL"), "OPSKIP": ("OFF",)}
-# Statements that may move a place or a frame, and what they are.
+# Statements that may move a position or a frame, and what they are.
 _REASONS = {
     "PREFUN": "a G word of one control, which may move anything: let CAM write what it does, or "
     "delete the line if it moves nothing",
@@ -46,30 +46,34 @@ _MOVING = re.compile(
     r"(?<![A-Z])[GXYZABCUVW]\s*=?\s*[-+.0-9#(\[R]|\bA?(?:TRANS|ROT|SCALE|MIRROR)\b"
     r"|\b(?:CYCLE[0-9]+|CALL|TRAORI|TRAFOOF|M9[6-9]|M198)\b"
 )
-# A line for a control; like texts it has all that stands in it: no sign goes on in the next line.
+# A line for a control is taken literally, as texts are: a trailing $ does not continue it.
 _AS_IT_IS = "INSERT"
-# Lines of texts, planes that the tip is on anyway, and what systems write of their own.
+# Lines of text, and planes that the tool tip is on anyway.
 _TEXTS = ("PARTNO", "PPRINT", "TPRINT", "REMARK", "DISPLY", "LETTER", "PSIS")
-_OWN = ("TOOL PATH", "END-OF-PATH", "CSI_")
-# Words that are the events of a cut: they concern other things than the arm.
+# Lines that CAM systems add.
+_SYSTEM_LINES = ("TOOL PATH", "END-OF-PATH", "CSI_")
+# Statements that are events of a cut, not motions of the arm.
 _EVENTS = ("SPINDL", "COOLNT", "AUXFUN", "ARCON", "ARCOFF", "STOP", "OPSTOP", "DELAY")
 _ENDS = ("FINI", "END")
-# An arc of NX says tolerances and its cutter as well, and turns left-handed about its axis; all
-# others turn right-handed.
-_OF_NX = 11
-# An arc that CATIA writes as a cylinder and what it ends on: numbers in brackets behind these.
-_ROUND = re.compile(r"\(\s*(CIRCLE|CYLNDR)\s*/([^()]*)\)")
-_LAST = re.compile(r"\(\s*(LINE|POINT)\s*/([^()]*)\)")
-# Cycles whose holes are drilled in steps, words for these, and those with a number behind them.
+# Number of fields of an arc of NX, which adds tolerances and the cutter. It turns left-handed about
+# its axis; all others turn right-handed.
+_NX_ARC_FIELDS = 11
+# An arc of CATIA is a circle or cylinder, with numbers in brackets …
+_CATIA_ARC = re.compile(r"\(\s*(CIRCLE|CYLNDR)\s*/([^()]*)\)")
+# … and the line or point that it ends on.
+_CATIA_END = re.compile(r"\(\s*(LINE|POINT)\s*/([^()]*)\)")
+# Cycles that drill in steps.
 _PECKS = ("DEEP", "DEEP2", "BRKCHP")
+# Words for the length of a step.
 _STEPS = ("SUBPECK", "STEP", "INCR")
-_OF_HOLES = (
+# Words of a cycle with a number after them.
+_CYCLE_WORDS = (
     *("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK"),
     *_STEPS,
 )
-# Difference of axes that are the same.
+# Largest difference of equal axes.
 _TURNED = 1e-6
-# Cosine of the angle between axes of a frame that counts as none: rounding of files.
+# Largest cosine between the axes of a frame, by the rounding of files.
 _SQUARE = 1e-4
 _UP = np.array([0.0, 0.0, 1.0])
 # Largest number of turns of a helix.
@@ -77,7 +81,7 @@ _TURNS = 1000
 
 
 class _Arc(NamedTuple):
-    """The circle that the next place is on: right-handed about its axis, with turns besides."""
+    """The circle to the next position: right-handed about its axis, with additional turns."""
 
     center: Array
     axis: Array
@@ -116,31 +120,31 @@ class _Reader:
 
     def __init__(self, file: FilePath, unit: str | None) -> None:
         self.machine = Machine(file)
-        self._given = None if unit is None else LENGTH_UNITS[unit]
-        self._unit, self._rapid = self._given or _MM, False
-        # The word of the file that says its unit, and the one of its feeds.
-        self._unit_said: float | None = None
-        self._feed_said: float | None = None
+        self._given_unit = None if unit is None else LENGTH_UNITS[unit]
+        self._unit, self._rapid = self._given_unit or _MM, False
+        # Units that the file states for lengths and feeds [m]; None if it does not.
+        self._stated_unit: float | None = None
+        self._stated_feed_unit: float | None = None
         self._feed_is_bare = False
-        # Where its coordinates are: the axes of the frame in columns, and its origin.
+        # The frame of its coordinates: axes in columns, and origin [m].
         self._axes: Array = np.eye(3)
         self._origin: Array = np.zeros(3)
         self._msys: tuple[Array, Array] | None = None
-        # What the first statement of a kind said that a file has one of.
+        # The first statement of kinds of which a file may have only one.
         self._first: dict[str, str] = {}
-        # Stated for the next places beforehand: an arc, a direction, the tool's axis.
+        # Stated before the next position: an arc, the direction at its start, the tool's axis.
         self._arc: _Arc | None = None
-        self._ahead: Array | None = None
+        self._start_direction: Array | None = None
         self._axis: Array | None = None
         self._in_world = False
-        # The words of a cycle while there is one.
+        # Parameters of the active drilling cycle.
         self._cycle: dict[str, float] = {}
-        # Where the tool was before it.
-        self._level: Array = np.full(3, np.nan)
+        # Position of the tool before the cycle [m].
+        self._position_before_cycle: Array = np.full(3, np.nan)
 
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts by names."""
-        if self._given is None and self._unit_said is None:
+        if self._given_unit is None and self._stated_unit is None:
             self.machine.notes.append("no statement says UNITS: lengths are taken for mm")
         if self._feed_is_bare:
             self.machine.notes.append(
@@ -153,13 +157,13 @@ class _Reader:
         machine = self.machine
         if len(text) > _LONGEST:
             raise machine.fault(f"has {len(text)} characters, expected {_LONGEST} at most")
-        if text.startswith((*_TEXTS, *_OWN)):
+        if text.startswith((*_TEXTS, *_SYSTEM_LINES)):
             return False
         if text.startswith(_AS_IT_IS):
             self._insert(text.removeprefix(_AS_IT_IS).lstrip(" /"))
             return False
         if text.startswith("TLON"):
-            self._go_round(text)
+            self._catia_arc(text)
             return False
         if "=" in text:
             raise machine.fault(
@@ -173,12 +177,12 @@ class _Reader:
         given = [item.strip() for item in rest.split(",")] if rest else []
         if word in _ENDS:
             return True
-        if not self._goes(word, rest, given):
-            self._says(text, word, rest, given)
+        if not self._motion_statement(word, rest, given):
+            self._other_statement(text, word, rest, given)
         return False
 
-    def _goes(self, word: str, rest: str, given: list[str]) -> bool:
-        """Take a statement of where or how the tool goes; return whether it is one."""
+    def _motion_statement(self, word: str, rest: str, given: list[str]) -> bool:
+        """Take a statement about the motion of the tool; return whether it is one."""
         match word:
             case "GOHOME" if len(given) < 3:
                 self._go_home()
@@ -187,7 +191,7 @@ class _Reader:
             case "CIRCLE" | "MOVARC":
                 self._arc = self._arc_of(word, given)
             case "INDIRV":
-                self._ahead = self._axes @ self._numbers(word, given, 3)
+                self._start_direction = self._axes @ self._numbers(word, given, 3)
             case "TLAXIS":
                 self._axis = self._direction(self._numbers(word, given, 3).tolist())
                 self.machine.says_axis = True
@@ -199,14 +203,14 @@ class _Reader:
                 return False
         return True
 
-    def _says(self, text: str, word: str, rest: str, given: list[str]) -> None:
+    def _other_statement(self, text: str, word: str, rest: str, given: list[str]) -> None:
         """Take any other statement, or refuse it."""
         machine = self.machine
         match word:
             case "UNITS" | "UNIT":
                 if len(given) != 1 or given[0] not in _UNITS:
                     raise machine.fault(f"{word}/{rest[:40]}: expected MM or INCHES")
-                self._says_unit(_UNITS[given[0]])
+                self._set_unit(_UNITS[given[0]])
             case "MODE" | "SET" if "INCR" in given:
                 raise machine.fault(
                     f"{word}/{rest[:40]}: places by differences are not read; write MODE/ABSOL"
@@ -214,7 +218,7 @@ class _Reader:
             case "CUTCOM":
                 self._compensate(given)
             case "CYCLE":
-                self._drills(given)
+                self._set_cycle(given)
             case "NURBS":
                 raise machine.fault(
                     "NURBS: splines are not read; let CAM write lines or arcs (NX: motion output)"
@@ -222,11 +226,15 @@ class _Reader:
             case "TRNTYP" | "CSYS":
                 self._frame(word, given)
             case "MSYS":
-                self._turn_to(self._numbers(word, given, 9))
+                self._set_machine_frame(self._numbers(word, given, 9))
             case "OFSTNO":
-                self._only(word, rest, "another zero of the control: write one file for each")
+                self._require_unchanged(
+                    word, rest, "another zero of the control: write one file for each"
+                )
             case "SETUP" if given[:1] in (["START"], ["END"]):
-                self._only(word, ",".join(given[1:]), "another way to hold the part: one file each")
+                self._require_unchanged(
+                    word, ",".join(given[1:]), "another way to hold the part: one file each"
+                )
             case "LOADTL" | "LOAD":
                 if self._first.setdefault("LOADTL", rest) != rest:
                     machine.note_tool(
@@ -240,18 +248,18 @@ class _Reader:
                 machine.note("OPSKIP: what may be skipped is read")
             case _ if word in _REASONS:
                 raise machine.fault(f"{text[:40]}: {_REASONS[word]}; it is not read")
-            case _ if word not in _NOTHING:
+            case _ if word not in _IGNORED:
                 raise machine.unread(f"statement '{text[:40]}'")
 
-    def _only(self, word: str, said: str, what: str) -> None:
-        """Refuse a statement that says something else than the first of its kind did."""
-        if self._first.setdefault(word, said) != said:
+    def _require_unchanged(self, word: str, values: str, what: str) -> None:
+        """Refuse a statement whose values differ from the first of its kind."""
+        if self._first.setdefault(word, values) != values:
             raise self.machine.fault(
-                f"{word}/{said[:40]} after {word}/{self._first[word][:40]}: {what}"
+                f"{word}/{values[:40]} after {word}/{self._first[word][:40]}: {what}"
             )
 
     def _insert(self, text: str) -> None:
-        """Take a line that goes to the control as it is."""
+        """Take a line that is passed to the control unchanged."""
         if _MOVING.search(text):
             raise self.machine.fault(
                 f"INSERT {text[:40]}: words of a control that may move something are not read: let "
@@ -260,7 +268,7 @@ class _Reader:
         self.machine.note(f"INSERT {text[:40]}: lines for a control are passed over")
 
     def _position(self, values: Sequence[float]) -> Array:
-        """Return a place (3,) [m] of the file in its first frame."""
+        """Return a position of the file (3,) in its first frame [m]."""
         found: Array = self._origin + self._axes @ (self._unit * np.array(values))
         return found
 
@@ -268,8 +276,8 @@ class _Reader:
         """Return a direction (3,) of the file in its first frame."""
         return self._axes @ unit_axis(values, self.machine)
 
-    def _turn_to(self, values: Array) -> None:
-        """Go over to a machine coordinate system, ``MSYS/x,y,z``, its x axis and its y axis.
+    def _set_machine_frame(self, values: Array) -> None:
+        """Change to a machine coordinate system, ``MSYS/x,y,z``, its x axis and its y axis.
 
         Coordinates of the first one are those of the file.
         """
@@ -289,7 +297,7 @@ class _Reader:
         axes, origin = self._msys
         before = self._axes
         self._axes, self._origin = axes.T @ own[0], axes.T @ (own[1] - origin)
-        # The words of an axis that is not said again are those of the new frame.
+        # An axis that is not stated again keeps its numbers, in the new frame.
         turn = self._axes @ before.T
         machine.axis = turn @ machine.axis
         if np.abs(self._axes - before).max() > _TURNED or self._origin.any():
@@ -298,19 +306,19 @@ class _Reader:
                 "the first"
             )
 
-    def _says_unit(self, unit: float) -> None:
-        """Take the word for the unit of lengths."""
-        self._unit_said = unit
-        self._unit = self._given or unit
-        self._agrees()
+    def _set_unit(self, unit: float) -> None:
+        """Take the unit of lengths that the file states [m]."""
+        self._stated_unit = unit
+        self._unit = self._given_unit or unit
+        self._check_units()
 
-    def _agrees(self) -> None:
+    def _check_units(self) -> None:
         """Refuse a file whose feeds are in another unit than its lengths, unless that is given."""
-        if self._given or self._feed_said is None:
+        if self._given_unit or self._stated_feed_unit is None:
             return
-        if self._feed_said != (self._unit_said or _MM):
-            feeds = "IPM" if self._feed_said == _INCH else "MMPM"
-            lengths = {None: "no UNITS", _INCH: "UNITS/INCHES", _MM: "UNITS/MM"}[self._unit_said]
+        if self._stated_feed_unit != (self._stated_unit or _MM):
+            feeds = "IPM" if self._stated_feed_unit == _INCH else "MMPM"
+            lengths = {None: "no UNITS", _INCH: "UNITS/INCHES", _MM: "UNITS/MM"}[self._stated_unit]
             raise self.machine.fault(
                 f"feeds are in {feeds}, and the file has {lengths}: say in which unit its lengths "
                 f"are: unit = 'in' or 'mm' (--unit)"
@@ -331,13 +339,13 @@ class _Reader:
             axis, machine.says_axis = self._direction(values[3:]), True
         travels = word in ("FROM", "GOHOME")
         if self._cycle and not travels:
-            self._drill(position, axis)
+            self._drill_hole(position, axis)
         else:
-            self._to(position, axis, travels=self._rapid or travels)
+            self._move_to(position, axis, travels=self._rapid or travels)
 
-    def _drills(self, given: list[str]) -> None:
-        """Take a cycle: what it is, and its words, each with a number behind it."""
-        machine, said = self.machine, f"CYCLE/{','.join(given)[:40]}"
+    def _set_cycle(self, given: list[str]) -> None:
+        """Take a drilling cycle: its kind, and its words, each with a number after it."""
+        machine, statement = self.machine, f"CYCLE/{','.join(given)[:40]}"
         if given[:1] in (["OFF"], ["INIT"], ["CLEAR"]):
             self._cycle = {}
             return
@@ -345,38 +353,40 @@ class _Reader:
             self._cycle = {}
         items = given[1:] if given[:1] in (["ON"], ["DRILL"]) else list(given)
         found = dict(self._cycle)
-        # What numbers with no word before them say.
+        # The meaning of numbers without a word before them, in order.
         bare = ["FEDTO", "CLEAR"]
         while items:
             word = items.pop(0)
             if word in _PECKS:
                 found[word[:4]] = 1.0
             elif word == "RTRCTO" and items[:1] == ["AUTO"]:
-                # Back to where it was before the cycle.
+                # Back to the height before the cycle.
                 items.pop(0)
                 found["AUTO"] = 1.0
-                self._level = machine.position.copy()
-            elif word in _OF_HOLES and items:
+                self._position_before_cycle = machine.position.copy()
+            elif word in _CYCLE_WORDS and items:
                 found[word] = self._number(items.pop(0))
             elif _NUMBER.fullmatch(word) and bare:
                 found[bare.pop(0)] = self._number(word)
             else:
                 raise machine.fault(
-                    f"{said}: '{word}' of a cycle is not read, but DRILL, DEEP and BRKCHP are; let "
-                    f"CAM write the moves (GOTO, RAPID)"
+                    f"{statement}: '{word}' of a cycle is not read, but DRILL, DEEP and BRKCHP are; "
+                    f"let CAM write the moves (GOTO, RAPID)"
                 )
         if not {"FEDTO", "DEPTH"} & set(found) or not {"RAPTO", "CLEAR"} & set(found):
-            raise machine.fault(f"{said}: expected a depth (FEDTO) and a height (RAPTO or CLEAR)")
+            raise machine.fault(
+                f"{statement}: expected a depth (FEDTO) and a height (RAPTO or CLEAR)"
+            )
         for word in ("MMPM", "IPM"):
             if word in found:
                 self._feed([str(found.pop(word)), word])
         self._cycle = found
 
-    def _drill(self, top: Array, axis: Array) -> None:
+    def _drill_hole(self, top: Array, axis: Array) -> None:
         """Drill a hole of the cycle, whose top is given."""
         cycle, unit = self._cycle, self._unit
         height = unit * cycle.get("RAPTO", cycle.get("CLEAR", 0.0))
-        # NX says depths by what is below 0, others by how deep.
+        # NX states depths as negative heights, others as positive depths.
         depth = unit * abs(cycle.get("FEDTO", cycle.get("DEPTH", 0.0)))
         pecks = None
         if "DEEP" in cycle or "BRKC" in cycle:
@@ -384,9 +394,9 @@ class _Reader:
             first = cycle.get("1STPECK", others)
             pecks = Pecks(unit * first, unit * others, is_out="DEEP" in cycle)
         waits = cycle.get("DWELL", 0.0) > 0.0
-        # Between holes it is as high as it says, or as it was before them.
+        # Height between holes: as stated, or that before the cycle.
         level = max(height, unit * cycle.get("RTRCTO", 0.0))
-        before = float((self._level - top) @ axis)
+        before = float((self._position_before_cycle - top) @ axis)
         if "AUTO" in cycle and np.isfinite(before):
             level = max(level, before)
         over = top + level * axis
@@ -402,12 +412,12 @@ class _Reader:
         )
         if level > height:
             self.machine.rapid(over, axis)
-        self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
+        self._arc, self._start_direction, self._axis, self._rapid = None, None, None, False
 
-    def _to(self, position: Array, axis: Array, *, travels: bool) -> None:
-        """Go somewhere, along the arc that was stated before, if there is one."""
+    def _move_to(self, position: Array, axis: Array, *, travels: bool) -> None:
+        """Move to a position, along the arc that was stated before, if there is one."""
         machine, arc = self.machine, self._arc
-        self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
+        self._arc, self._start_direction, self._axis, self._rapid = None, None, None, False
         if travels:
             machine.rapid(position, axis)
         elif arc is None:
@@ -422,7 +432,7 @@ class _Reader:
     def _go_home(self) -> None:
         machine = self.machine
         machine.climbs()
-        self._to(np.full(3, np.nan), machine.axis, travels=True)
+        self._move_to(np.full(3, np.nan), machine.axis, travels=True)
         machine.note_home("GOHOME", "the next GOTO")
 
     def _arc_of(self, word: str, given: list[str]) -> _Arc:
@@ -434,7 +444,7 @@ class _Reader:
                 f"{word} has {len(values)} numbers, expected x,y,z of its centre, i,j,k of its "
                 f"axis and its radius"
             )
-        is_left = word == "CIRCLE" and len(values) - ("TIMES" in given) >= _OF_NX
+        is_left = word == "CIRCLE" and len(values) - ("TIMES" in given) >= _NX_ARC_FIELDS
         turns = values[-1] if "TIMES" in given else values[-1] / 360.0 if "ANGLE" in given else 1.0
         if not 0.0 < turns <= _TURNS:
             raise self.machine.fault(f"{word} goes round {turns:g} times, expected up to {_TURNS}")
@@ -442,11 +452,11 @@ class _Reader:
         more_turns = int(np.ceil(turns - 1e-6)) - 1
         return _Arc(self._position(values[:3]), -axis if is_left else axis, more_turns)
 
-    def _go_round(self, text: str) -> None:
+    def _catia_arc(self, text: str) -> None:
         """Go along an arc as CATIA writes it: ``INDIRV/…`` and ``TLON,GOFWD/ (CIRCLE/ …``."""
-        machine, ahead = self.machine, self._ahead
-        body, ends = _ROUND.search(text), _LAST.findall(text)
-        if body is None or not ends or ahead is None:
+        machine, start_direction = self.machine, self._start_direction
+        body, ends = _CATIA_ARC.search(text), _CATIA_END.findall(text)
+        if body is None or not ends or start_direction is None:
             raise machine.unread(
                 f"'{text[:60]}', but for TLON,GOFWD/ (CIRCLE/…),ON,(LINE/…) after INDIRV/…,"
             )
@@ -456,11 +466,11 @@ class _Reader:
             raise machine.fault(f"'{text[:60]}': expected a centre, a radius and where it ends")
         center, goal = self._position(values[:3]), self._position(last[-3:])
         axis = self._direction(_UP.tolist() if body[1] == "CIRCLE" else values[3:6])
-        # The side that it begins to.
-        forward = float(np.cross(machine.position - center, ahead) @ axis)
+        # Positive where the arc is right-handed about the axis.
+        forward = float(np.cross(machine.position - center, start_direction) @ axis)
         self._arc = _Arc(center, -axis if forward < 0.0 else axis, 0)
         tool = machine.axis if self._axis is None else self._axis
-        self._to(goal, tool, travels=self._rapid)
+        self._move_to(goal, tool, travels=self._rapid)
 
     def _compensate(self, given: list[str]) -> None:
         if given[:1] not in (["OFF"], ["ON"]):
@@ -470,7 +480,7 @@ class _Reader:
             )
 
     def _frame(self, word: str, given: list[str]) -> None:
-        """Take where coordinates are: those of one frame only are read."""
+        """Take the frame of coordinates: only one frame is read."""
         if word == "TRNTYP":
             self._in_world = given[:1] == ["WORLD"]
         is_same = self._in_world
@@ -496,9 +506,9 @@ class _Reader:
             )
         scale = _FEEDS[units[0]] if units else None
         if scale is not None:
-            self._feed_said = scale
-            self._agrees()
-        elif self._feed_said is None:
+            self._stated_feed_unit = scale
+            self._check_units()
+        elif self._stated_feed_unit is None:
             self._feed_is_bare = True
         feed = self._number(numbers[0]) * (scale or self._unit) / 60.0
         if not 0.0 < feed < 1e3:

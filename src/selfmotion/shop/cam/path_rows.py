@@ -1,4 +1,4 @@
-"""Rows of poses, as files of several kinds hold them."""
+"""Rows of poses from tables, arrays and ROS messages: columns, units and orientations."""
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ _ROTATION_VECTOR = ("rx", "ry", "rz")
 _ROTATION_VECTOR_NOTE = (
     "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
 )
-# Half a turn that is written with few digits is more than that by such a share.
+# Relative rounding that is allowed above half a turn.
 _HALF_TURN = 2e-4
 
 
@@ -101,7 +101,7 @@ _KUKA_NOTE = (
 _MAX_METRES = 10.0
 
 
-# Names that are long enough to be taken for one another.
+# Names that are offered as spelling suggestions.
 _HINTED = ("feed", "roll", "pitch", "yaw")
 
 
@@ -115,7 +115,7 @@ _UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class PoseRows:
-    """Poses as a file has them, and what to call each of them.
+    """Poses of a file, with a label for each.
 
     Attributes
     ----------
@@ -125,21 +125,20 @@ class PoseRows:
     orientation : str
         Key in `ORIENTATIONS`; "" for none.
     values : (N, …)
-        Numbers of the orientations.
+        Orientations, in the form that `orientation` names.
     t : (N,) or None
     feed : (N,) or None
-        From each pose on [m/s].
+        Feed from each pose on [m/s].
     events : tuple of (int, str)
-        At which pose what happens.
+        Index of a pose, and the name of the event there.
     straight : bool
         Whether the tool goes straight from pose to pose.
     one_way : bool
-        Whether it is meant in its own direction only, as cuts of a machine are.
+        Whether its direction of travel is fixed, as that of machining cuts is.
     notes : tuple of str
-        What to know of how the file was read.
+        Assumptions that were made in reading the file.
     rapid : (N,) or None
-        Whether the tool goes on from each pose as fast as it may, whatever the feed; None for
-        nowhere.
+        Whether the motion from each pose on is rapid, whatever the feed; None for nowhere.
     """
 
     labels: Sequence[str]
@@ -155,9 +154,9 @@ class PoseRows:
     rapid: Flags | None = None
 
 
-# Options of `read_path` that say what a file means.
+# Options of `read_path` about the contents of a file.
 READING = ("columns", "rotary", "rotary_axes", "rotary_center", "unit")
-# Metres of the units that a drawing or a file of cutter locations may be said to be in.
+# Units that may be given for drawings and cutter locations [m].
 LENGTH_UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "in": 25.4e-3, "ft": 0.3048}
 DRAWING = ".dxf"
 # Suffixes of files of cutter locations: of APT, CATIA, NX and Creo.
@@ -166,7 +165,7 @@ CLDATA = (".apt", ".aptsource", ".cls", ".clsf", ".cl", ".ncl")
 
 @dataclass(frozen=True)
 class Reading:
-    """Options of reading a file, which it does not state itself; see `read_path`.
+    """Options for reading a file, for what the file does not state; see `read_path`.
 
     Attributes
     ----------
@@ -184,7 +183,7 @@ class Reading:
 
     @classmethod
     def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
-        """Return the reading that options ask for; others are passed over.
+        """Return those among the options of `read_path`; unrelated ones are ignored.
 
         Raises
         ------
@@ -230,13 +229,13 @@ def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatE
 
 def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, PoseRows]:
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
-    said = set[str]()
+    with_unit = set[str]()
 
-    def called(title: str) -> str:
-        """Return the name of a title here, and remember those that state their unit."""
+    def normalised(title: str) -> str:
+        """Return the column's name for a title, and record titles that state a unit."""
         name = column_name(title)
         if "[" in title or "(" in title:
-            said.add(name)
+            with_unit.add(name)
         return name
 
     header, table, lines, texts = read_rows(
@@ -244,11 +243,11 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
         (SEAM, EVENT),
         check=lambda names: [_si_column(file, name) for name in _kuka_titles(names)],
         columns=None if reading is None else reading.columns,
-        named=called,
+        named=normalised,
         usual=_HEADERS,
     )
     labels = [f"line {number}" for number in lines]
-    whole = rows_of_table(file, header, table, labels, texts, said)
+    whole = rows_of_table(file, header, table, labels, texts, with_unit)
     if SEAM not in texts:
         return {"": whole}
     if not lines:
@@ -285,18 +284,18 @@ def rows_of_table(
     table: Array,
     labels: Sequence[str],
     texts: Mapping[str, Sequence[str]],
-    said: Collection[str] = (),
+    with_unit: Collection[str] = (),
 ) -> PoseRows:
-    """Return rows of poses of the columns of numbers of a table, and of its texts.
+    """Return the poses of a table, from its columns of numbers and of texts.
 
-    Of `said` columns the file says the unit, though their names do not.
+    Columns `with_unit` have a unit in the title, though not in their name.
     """
     notes: tuple[str, ...] = ()
     if (titles := _kuka_titles(header)) != list(header):
         _check_millimetres(file, header, table)
         header, notes = titles, (_KUKA_NOTE,)
     columns = _columns(file, header, table)
-    notes += _units_note([title for title in header if title not in said])
+    notes += _units_note([title for title in header if title not in with_unit])
     events = texts.get(EVENT, [""] * len(labels))
     missing = [name for name in _POSITION if name not in columns]
     if missing:

@@ -1,4 +1,4 @@
-"""A joint motion as a program of a controller has it, whichever its language."""
+"""A program of a controller as segments of joint motion, whichever its language."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -27,6 +27,11 @@ from selfmotion.shop.controllers.thinning import operations_of
 from selfmotion.shop.controllers.tool_frames import WORLD
 from selfmotion.work.job import Program
 
+# Largest distance of a first pose that was taught anew from the axis target before [rad or m].
+_MAX_START_GAP = 0.02
+# Remaining time of an operation that counts as none [s].
+_TIME_TOLERANCE = 1e-4
+
 
 class Switch(NamedTuple):
     """An output or event that a program switches.
@@ -34,11 +39,11 @@ class Switch(NamedTuple):
     Attributes
     ----------
     at : float
-        From the begin of its motion [s].
+        Time since the start of the motion [s].
     output : str
-        What is switched; of an event that is a comment only its name.
+        Name of the output; of an event that is only a comment, its name.
     value : bool or None
-        To what; None for a comment.
+        The new value; None for a comment.
     """
 
     at: float
@@ -48,7 +53,7 @@ class Switch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ControllerProgram:
-    """A motion by a controller's program file.
+    """The motion of a program file.
 
     Attributes
     ----------
@@ -59,27 +64,25 @@ class ControllerProgram:
     segments : tuple of Segment
         From rest to rest, coordinates in the order of the axes.
     deviation : Deviations
-        How far targets are off the motion, as the file states it.
+        Deviation of the targets from the motion, as the file states it.
     switches : tuple of Switch
-        What is switched when, in order.
+        Outputs that are switched, in order of time.
     shift : SE3 or None
-        By how much the work object is elsewhere than it was planned, in the frame of its carrier;
-        None where it is not.
+        Displacement of the work object from the plan, in the frame of its carrier; None for none.
     carrier : str
         The link that the work object is fixed to, or ``"world"``.
     remark : str
-        Reason why targets are joints in place of poses.
+        Why targets are joints in place of poses.
     within : Tolerance or None
-        Within what seams at speeds keep what is prescribed, by their certificates; None where none
-        is at a speed.
+        Path tolerance that is certified for seams with a programmed feed; None if there are none.
     timed : tuple of str
-        Why seams with a feed have times all the same, each reason once.
+        Why seams with a feed are programmed with times, each reason once.
     approach : float
-        How far joints go slowly from the axis target at its begin to its first pose [rad or m].
+        Joint distance of the slow move from the initial axis target to the first pose [rad or m].
     facts : ProgramFacts or None
-        What its head states that it rests on; None where it states nothing.
+        Preconditions that the header states, such as held joints and the flange; None for none.
     load : Load or None
-        What it says that the flange carries; None where it leaves that to the controller.
+        The load at the flange; None where the program leaves it to the controller.
     """
 
     name: str
@@ -103,11 +106,11 @@ class ControllerProgram:
 
     @property
     def start_fault(self) -> str:
-        """Reason why the axis target at its begin does not fit its first pose; empty for none.
+        """Why the initial axis target does not fit the first pose; empty for none.
 
-        Of a shifted work object the motion to the shifted begin is to be expected.
+        With a shifted work object, a move to the shifted start is expected.
         """
-        if self.shift is not None or self.approach <= _TAUGHT:
+        if self.shift is not None or self.approach <= _MAX_START_GAP:
             return ""
         return (
             f"its first axis target is {self.approach:.3g} rad or m from where its first pose has "
@@ -123,22 +126,24 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        return self._motion([next(own) for own in self._joined(None)])
+        return self._motion([next(own) for own in self._segment_motions(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
         """Return the motions of a controller, one for each interpolation between targets.
 
-        The cubic spline comes first. With a path, seams at speeds are at its pace: ramps are those
-        of the plan.
+        The cubic spline comes first. With a path, seams with a programmed feed have its pace, with
+        the ramps of the plan.
 
         Raises
         ------
         FileFormatError
             There is none, or a speed is another one than the path has.
         """
-        return [self._motion(parts) for parts in by_interpolation(self._joined(path))]
+        return [
+            self._motion(segments) for segments in by_interpolation(self._segment_motions(path))
+        ]
 
-    def _joined(self, path: Path | None) -> Iterator[Iterator[Knots]]:
+    def _segment_motions(self, path: Path | None) -> Iterator[Iterator[Knots]]:
         """Yield the motions of each segment, one for each interpolation."""
         begin = 0.0
         for segment in self.segments:
@@ -150,9 +155,10 @@ class ControllerProgram:
                 yield segment.motions()
             begin += segment.duration
 
-    def _motion(self, parts: Sequence[Knots]) -> Trajectory:
-        t, q, qd = [np.zeros(1)], [parts[0].q[:1]], [0.0 * parts[0].q[:1]]
-        for times, places, rates in parts:
+    def _motion(self, segments: Sequence[Knots]) -> Trajectory:
+        """Return the motions of all segments, one after the other."""
+        t, q, qd = [np.zeros(1)], [segments[0].q[:1]], [0.0 * segments[0].q[:1]]
+        for times, places, rates in segments:
             t.append(t[-1][-1] + times[1:])
             q.append(places[1:])
             qd.append(rates[1:])
@@ -160,7 +166,7 @@ class ControllerProgram:
         return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
 
     def deviation_of(self, plan: Plan | Parts | Move | Program) -> Deviations:
-        """Return how far it is off the motion of a plan, parts, a move or a program.
+        """Return the deviation from the motion of a plan, parts, a move or a program.
 
         Raises
         ------
@@ -173,7 +179,9 @@ class ControllerProgram:
         if sorted(names) != sorted(known):
             raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
         order = [names.index(name) for name in known]
-        worst, at, k = Deviations(NO_DEVIATION, NO_DEVIATION), 0.0, 0
+        worst = Deviations(NO_DEVIATION, NO_DEVIATION)
+        # Time within the present operation, and its index.
+        elapsed, k = 0.0, 0
         for number, segment in enumerate(self.segments):
             if segment.is_slow and self.shift is None:
                 after = self.segments[min(number + 1, len(self.segments) - 1)].name
@@ -184,7 +192,7 @@ class ControllerProgram:
             same = segment.in_order(order)
             operation = operations[min(k, len(operations) - 1)]
             found = deviation_of(
-                same, operation.motion, operation.chains, operation.motion.t[0] + at
+                same, operation.motion, operation.chains, operation.motion.t[0] + elapsed
             )
             both = (
                 Deviations(NO_DEVIATION, found)
@@ -192,9 +200,9 @@ class ControllerProgram:
                 else Deviations(found, NO_DEVIATION)
             )
             worst = worst.worse(both)
-            at += segment.duration
-            if at >= operation.motion.duration - _MOMENT:
-                at, k = 0.0, k + 1
+            elapsed += segment.duration
+            if elapsed >= operation.motion.duration - _TIME_TOLERANCE:
+                elapsed, k = 0.0, k + 1
         if k > len(operations):
             raise FileFormatError("goes on when the motion has ended")
         if k < len(operations):
@@ -202,9 +210,3 @@ class ControllerProgram:
                 f"ends {len(operations) - k} seams or moves before the motion does"
             )
         return worst
-
-
-# Largest distance of a first pose that was taught anew from the axis target before [rad or m].
-_TAUGHT = 0.02
-# Rest of an operation that counts as none [s].
-_MOMENT = 1e-4

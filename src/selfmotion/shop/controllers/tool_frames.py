@@ -1,4 +1,4 @@
-"""Work objects in which controllers count tool poses, and the joints of such poses."""
+"""Work objects in which controllers express tool poses, and inverse kinematics of such poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,34 +19,32 @@ from selfmotion.shop.controllers.program_settings import (
     tool_from_flange,
 )
 
-# Angle of a frame above rounding [rad].
-_TURNED = 1e-6
-# Difference of frames that are the same [m, parts of quaternions].
-_SAME = 1e-9
+# Smallest angle between frames above rounding [rad].
+_ANGLE_TOLERANCE = 1e-6
+# Largest difference of equal frames [m, parts of quaternions].
+_FRAME_TOLERANCE = 1e-9
 
 # Distance of a work object that must be in another unit, as a multiple of the arm's reach.
 _FAR_IN_REACHES = 20.0
 
-# Where a controller counts tool poses: in a work object, and its arm's joints from such poses.
-#
-# A controller's work object stands in the frame that it counts its arm from, or on an axis of its
-# own that carries the part (a positioner). A tool pose in it and the external axes determine the
-# six joints of the arm that are near to known ones; they are found by Newton's method, Δq = J⁻¹
-# [Δp; log(R_wanted Rᵀ)], J the six columns of the arm's joints.
+# A controller expresses tool poses in a work object, which is fixed in the controller's base frame
+# or on an external axis that carries the part (a positioner). A tool pose and the external axes
+# determine the six joints of the arm near known ones. They are found by Newton's method, Δq = J⁻¹
+# [Δp; log(R_wanted Rᵀ)], with J the six columns of the arm's joints.
 
 # Name of the fixed frame, which is no link.
 WORLD = "world"
 _JOINTS = 6
 # Largest number of Newton steps.
-_STEPS = 20
+_MAX_ITERATIONS = 20
 # Largest change of a joint in one step [rad or m].
-_FARTHEST = 0.3
+_MAX_STEP = 0.3
 # Error at which the steps end [m, rad].
-_THERE = 1e-10
+_CONVERGED = 1e-10
 # Damping, added to the diagonal: steps stay finite in singular configurations.
-_DAMPED = 1e-14
-# Error that counts as solved: digits of files [m, rad].
-_NEAR = 1e-8
+_DAMPING = 1e-14
+# Largest error of a solution, by the digits of files [m, rad].
+_SOLVED = 1e-8
 
 
 def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
@@ -58,7 +56,7 @@ def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
 
 @dataclass(frozen=True, eq=False)
 class ToolFrames:
-    """A work object, the frame that it stands in, and the tool that is moved in it.
+    """A work object, its carrier, and the tool that moves in it.
 
     Attributes
     ----------
@@ -68,9 +66,9 @@ class ToolFrames:
     carrier : str
         The link that the work object is fixed to, or ``"world"``.
     work : SE3
-        The work object in that frame.
+        Pose of the work object in its carrier.
     name : str
-        What the work object is called.
+        Of the work object.
     tool : SE3
         The tool in the flange, as the program has it.
     flange_to_tool : SE3
@@ -93,9 +91,10 @@ class ToolFrames:
         settings: ProgramSettings,
         path_frame: SE3 | None = None,
     ) -> "ToolFrames":
-        """Return those that settings ask for; `path_frame` is where they ask for that of the path.
+        """Return the frames by the settings of a program.
 
-        It is given in the link that the path rides on.
+        `path_frame` is the pose of the path's frame in its carrier link, for a work object that is
+        the frame of the path.
 
         Raises
         ------
@@ -182,26 +181,26 @@ class ToolFrames:
         return positions, Rotation.from_matrix(rotation.T @ rotations).as_quat()
 
     def solved(self, positions: Array, quaternions: Array, near: Array) -> tuple[Array, Flags]:
-        """Return q (K, n) for tool poses, from near ones, whose external axes stay; and where.
+        """Return joints (K, n) for tool poses by Newton's method, and whether it converged, (K,).
 
-        The second is whether Newton's method arrived, (K,).
+        From seeds `near` (K, n), whose external axes are kept.
         """
         from scipy.spatial.transform import Rotation
 
         rotation = np.asarray(self.work.rotation)
         wanted = positions @ rotation.T + self.work.translation
-        facing = rotation @ Rotation.from_quat(quaternions).as_matrix()
+        wanted_rotations = rotation @ Rotation.from_quat(quaternions).as_matrix()
         q = np.array(near)
-        for step_number in range(_STEPS + 1):
+        for step_number in range(_MAX_ITERATIONS + 1):
             jacobian, rotations, translations = self._tool_along(q)
-            turned = rotation_vectors(facing @ rotations.transpose(0, 2, 1))
-            off = np.hstack([wanted - translations, turned])
-            if step_number == _STEPS or np.abs(off).max() < _THERE:
+            turned = rotation_vectors(wanted_rotations @ rotations.transpose(0, 2, 1))
+            residual = np.hstack([wanted - translations, turned])
+            if step_number == _MAX_ITERATIONS or np.abs(residual).max() < _CONVERGED:
                 break
-            step = self._rates(jacobian, off)
-            size = np.maximum(np.abs(step).max(axis=1) / _FARTHEST, 1.0)
+            step = self._rates(jacobian, residual)
+            size = np.maximum(np.abs(step).max(axis=1) / _MAX_STEP, 1.0)
             q[:, self.arm] += step / size[:, None]
-        return q, np.asarray(np.abs(off).max(axis=1) < _NEAR)
+        return q, np.asarray(np.abs(residual).max(axis=1) < _SOLVED)
 
     def joint_rates(self, q: Array, rates: Array) -> Array:
         """Return rates of the tool in the work object (K, 6) as rates of the arm's joints."""
@@ -210,9 +209,9 @@ class ToolFrames:
         return self._rates(self._tool_along(q)[0], turned)
 
     def regularity(self, q: Array) -> Array:
-        """Return how far the tool moves at least, of all motions of the arm of 1 rad, (K,).
+        """Return the smallest singular values of the arm's Jacobian, in m and rad, (K,).
 
-        The least singular value of the arm's Jacobian, in m and rad: 0 in a singular pose.
+        0 in a singular pose.
         """
         own = self._tool_along(q)[0][:, :, self.arm]
         return np.asarray(np.linalg.svd(own, compute_uv=False)[:, -1])
@@ -232,7 +231,7 @@ class ToolFrames:
 
     def _rates(self, jacobian: Array, rates: Array) -> Array:
         own = jacobian[:, :, self.arm]
-        gram = own @ own.transpose(0, 2, 1) + _DAMPED * np.eye(6)
+        gram = own @ own.transpose(0, 2, 1) + _DAMPING * np.eye(6)
         solved = np.linalg.solve(gram, rates[:, :, None])[:, :, 0]
         return np.asarray(np.einsum("kji,kj->ki", own, solved))
 
@@ -259,7 +258,7 @@ class ToolFrames:
 
 
 def own_joint(robot: RobotModel, axes: Sequence[Axis]) -> str:
-    """Return the external axis that is between the first and the last of A1 to A6; else empty."""
+    """Return the external axis between the first and the last of A1 to A6; "" for none."""
     carrying = robot.chain_to(robot.tool).joints.tolist()
     arm = [k for k, joint in enumerate(carrying) if axes[joint].name.startswith("A")]
     inside = carrying[arm[0] : arm[-1]] if arm else []
@@ -267,7 +266,7 @@ def own_joint(robot: RobotModel, axes: Sequence[Axis]) -> str:
 
 
 def base_of(robot: RobotModel) -> str:
-    """Return the frame that the controller counts its fixed arm from: link ``base``, or the world.
+    """Return the controller's base frame: the link ``base``, or the world.
 
     By the conventions of ROS-Industrial ``base`` is the controller's frame.
     """
@@ -278,16 +277,13 @@ def base_of(robot: RobotModel) -> str:
 
 
 def turned_base(robot: RobotModel) -> str:
-    """Return how the frame that the controller counts from is turned from the root, in words.
-
-    Empty where it is not.
-    """
+    """Return how the controller's base frame is rotated from the root, in words; "" if it is not."""
     base = base_of(robot)
     if base == WORLD:
         return ""
     pose = robot.chain_to(base).place(np.zeros(robot.dof))
     angle = float(np.linalg.norm(log3(pose.rotation)))
-    if angle < _TURNED:
+    if angle < _ANGLE_TOLERANCE:
         return ""
     return (
         f"work objects are counted in '{base}', the controller's frame, which is turned by "
@@ -306,7 +302,7 @@ def frame_of_paths(paths: Sequence[Path]) -> SE3:
     """
     frames = [_placed(path) for path in paths] or [SE3.Identity()]
     for frame in frames[1:]:
-        if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _SAME:
+        if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _FRAME_TOLERANCE:
             raise ProblemError(
                 f"work_object '{OF_PATH}': paths are given in several frames, expected one; give "
                 f"the name of a link, or a pose"
