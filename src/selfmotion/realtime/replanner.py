@@ -155,8 +155,9 @@ class Replanner:
         halves = np.interp(np.arange(2 * grid.steps + 1), 2 * np.arange(grid.steps + 1), grid.nodes)
         self._ahead, self._times = ahead, np.concatenate([halves, ahead])
         self._functions = self._horizon.functions(ahead)
-        four = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
-        self._stages = np.append(four.ravel(), 2 * grid.steps)
+        # Stages of the Runge-Kutta method among nodes and middles.
+        stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
+        self._stages = np.append(stages.ravel(), 2 * grid.steps)
 
     def reset(self) -> None:
         """Reset: the next step starts at its measured state."""
@@ -208,13 +209,13 @@ class Replanner:
             How the target moves: velocity of its origin [m/s] and angular velocity [rad/s], world
             axes. By default it rests.
         seen : float, optional
-            When the target was seen, on the clock of `t` [s]; by default at `t`. One that was seen
-            longer ago than `patience` is none, however often it is sent.
+            When the target was seen, on the clock of `t` [s]; by default at `t`. One older than
+            `patience` is ignored, however often it is sent.
         chunk : sequence of SE3, or (K, 4, 4), optional
             Where the tool is to be at `times` [m], world axes. What was followed before holds until
             the first of these, or `t`, and is then left for the chunk without a jump in
-            acceleration. One that is over, or has a number that is none, is left out, and
-            `Segment.reasons` says why; `Chunk.of` raises the same as an error.
+            acceleration. One that has ended, or has a number that is not finite, is
+            ignored, and `Segment.reasons` says why; `Chunk.of` raises the same as an error.
         times : (K,), optional
             Of the chunk, on the clock of `t` [s], increasing.
 
@@ -275,7 +276,7 @@ class Replanner:
         first = 0
         if target is not None:
             rate, place = commands.rate, commands.place
-            error = self._reference.begin(place, rate, target, self._held_up(passed))
+            error = self._reference.begin(place, rate, target, self._last_reference_twist(passed))
             flag = self._plan(passed, rate, place, reasons)
             if moving and flag is not Flag.STOPPING:
                 follows = commands.follow(self._kinematics, self._layout, self._table)
@@ -285,7 +286,7 @@ class Replanner:
         issued = commands.segment(first, flag, tuple(reasons), follows, error)
         unproved = self._unproved(issued)
         if unproved:
-            # What was proved before runs to its rest.
+            # The segment before, which is proved, runs to its stop.
             reasons.append(unproved)
             flag, follows = Flag.STOPPING, False
             issued = commands.segment(None, flag, tuple(reasons), follows, error)
@@ -306,7 +307,7 @@ class Replanner:
     def _unproved(self, segment: Segment) -> str:
         """Return why a segment is not proved to keep the arm clear of bodies; "" where it is.
 
-        Where the arm is expected: off its command as it is now.
+        At the expected position: the command plus the present deviation.
         """
         if self._around is None:
             return ""
@@ -322,11 +323,10 @@ class Replanner:
             self._around.forget()
         self._follows = self._started = True
 
-    def _held_up(self, passed: float) -> Array | None:
-        """Return the twist that the reference had where limits stopped the tool.
+    def _last_reference_twist(self, passed: float) -> Array | None:
+        """Return the last twist of the reference, if limits stopped the tool; else None.
 
-        Begun anew with the tool's own, it would never get faster than in one period: too little to
-        leave a singular pose by.
+        From the tool's own, nearly zero, it would never be fast enough to leave a singular pose.
         """
         cycle = round(passed / self.cycle)
         if self._follows or not 2 <= cycle <= self._cycles:
@@ -349,7 +349,7 @@ class Replanner:
         """Improve the plan; write ε of the cycles into the table."""
         n, horizon, stages = self.robot.dof, self._horizon, self._stages
         horizon.shift(passed)
-        kept = horizon.epsilon(self._ahead, self._functions)
+        epsilon = horizon.epsilon(self._ahead, self._functions)
         table = self._reference.table
         reference = PathSamples(
             horizon.grid.stage_times,
@@ -359,21 +359,21 @@ class Replanner:
         )
         flag = Flag.PLANNED
         if self._improved(place, rate, reference, reasons):
-            kept = horizon.epsilon(self._ahead, self._functions)
+            epsilon = horizon.epsilon(self._ahead, self._functions)
             if horizon.elastic:
                 reasons.append("no self-motion keeps all limits over the horizon")
             if self._around is not None and self._around.blocked:
                 reasons.append(self._around.message)
                 flag = Flag.STOPPING
         else:
-            flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
+            flag = Flag.KEPT if np.any(epsilon) else Flag.TRACKING
         # Through a singular pose an arm may continue on its other side.
         soon = horizon.breakdown < SOON
         self._without_motion = self._without_motion + max(passed, self.cycle) if soon else 0.0
-        held_up = horizon.breakdown < AHEAD and not self._follows
-        if held_up or self._without_motion > self._patience:
+        is_stuck = horizon.breakdown < AHEAD and not self._follows
+        if is_stuck or self._without_motion > self._patience:
             flag = Flag.STOPPING
-        self._table[:, n : 2 * n] = kept
+        self._table[:, n : 2 * n] = epsilon
         self._table[:, 2 * n :] = table[-self._cycles :]
         return flag
 

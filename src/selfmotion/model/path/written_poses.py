@@ -12,15 +12,15 @@ from selfmotion.model.task import SE3, Quaternion, exp3, rpy
 # A quaternion shorter than this has no direction.
 _ZERO = 1e-9
 # Largest position or angle; excludes NaN and infinity.
-_HUGE = 1e15
+_MAX_ABS_VALUE = 1e15
 
 
 def from_quaternion(values: Array) -> Array:
     """Return the rotation (3, 3) of a quaternion [w, x, y, z] of any length but zero."""
     length = float(np.linalg.norm(values))
-    if not _ZERO <= length < _HUGE:
-        said = "zero" if length < _ZERO else f"of length {length:g}"
-        raise ValueError(f"the quaternion is {said}, expected [w, x, y, z] of length 1")
+    if not _ZERO <= length < _MAX_ABS_VALUE:
+        found = "zero" if length < _ZERO else f"of length {length:g}"
+        raise ValueError(f"the quaternion is {found}, expected [w, x, y, z] of length 1")
     w, x, y, z = (values / length).tolist()
     return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
@@ -36,12 +36,12 @@ TURN_NOTE = (
 def from_normal(normal: Array) -> Array:
     """Return a rotation (3, 3) whose z axis is along `normal`; its x axis lies near the world's x.
 
-    Which of them does not matter to tasks that leave the rotation about the tool's axis free.
+    The choice of the x axis has no effect on tasks that leave the rotation about the tool free.
     """
     length = float(np.linalg.norm(normal))
-    if not _ZERO <= length < _HUGE:
-        said = "zero" if length < _ZERO else f"of length {length:g}"
-        raise ValueError(f"the normal is {said}, expected the direction of the tool's z axis")
+    if not _ZERO <= length < _MAX_ABS_VALUE:
+        found = "zero" if length < _ZERO else f"of length {length:g}"
+        raise ValueError(f"the normal is {found}, expected the direction of the tool's z axis")
     z = normal / length
     x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
     x = x - z * (z @ x)
@@ -75,7 +75,7 @@ def pose_of(value: Any) -> SE3:
     Raises
     ------
     ValueError, PathError
-        It is no pose; the message has the value and the expected form.
+        The value is not a pose; the message has the value and the expected form.
     """
     if isinstance(value, list):
         return path_pose(numbers(value, (4, 4), "the matrix"), "the pose")
@@ -104,6 +104,6 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
         array = np.array(value, dtype=np.float64)
     except (OverflowError, TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}, expected {size} numbers") from None
-    if array.shape != shape or not np.all(np.abs(array) < _HUGE):
+    if array.shape != shape or not np.all(np.abs(array) < _MAX_ABS_VALUE):
         raise ValueError(f"{what} is {value!r}, expected {size} finite numbers")
     return array

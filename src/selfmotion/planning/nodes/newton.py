@@ -192,12 +192,12 @@ class _Solver:
                 system = self._system(model)
                 if system is None:
                     return Status.GRADIENT
-                return self._move(model, self._step(system))
+                return self._line_search(model, self._step(system))
             if converged:
                 self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
             if last or not _is_barrier_solved(self):
-                return self._move(model, step)
+                return self._line_search(model, step)
             self._barrier = max(
                 self._last_barrier,
                 min(SETTINGS.kappa_mu * self._barrier, self._barrier**SETTINGS.theta_mu),
@@ -246,8 +246,8 @@ class _Solver:
         self._predicted = before
         return False
 
-    def _move(self, model: Model, step: Change) -> Status | None:
-        """Line search on the merit function along a step."""
+    def _line_search(self, model: Model, step: Change) -> Status | None:
+        """Take a step as far as a backtracking line search on the merit function allows."""
         motion, r = self.motion, step.nodes.shape[1] // 3
         promise = _raise_merit_penalty(self, model, step)
         merit = _merit(self, motion, self._slacks, self._elastics)

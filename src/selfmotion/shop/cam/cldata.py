@@ -370,8 +370,8 @@ class _Reader:
                 found[bare.pop(0)] = self._number(word)
             else:
                 raise machine.fault(
-                    f"{statement}: '{word}' of a cycle is not read, but DRILL, DEEP and BRKCHP are; "
-                    f"let CAM write the moves (GOTO, RAPID)"
+                    f"{statement}: '{word}' of a cycle is not read, but DRILL, DEEP and BRKCHP "
+                    f"are; let CAM write the moves (GOTO, RAPID)"
                 )
         if not {"FEDTO", "DEPTH"} & set(found) or not {"RAPTO", "CLEAR"} & set(found):
             raise machine.fault(

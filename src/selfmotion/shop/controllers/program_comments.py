@@ -16,15 +16,15 @@ from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_facts import ProgramFacts, with_checksum
 from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_texts import (
-    BECAUSE,
     DURATION_HEADING,
+    JOINT_TARGETS_REASON,
     TIMES_HEADING,
     TOLERANCE_HEADING,
     as_word,
     folded,
     of_word,
-    pin_values,
     plain,
+    pose_values,
     rounded_up,
 )
 from selfmotion.shop.controllers.segment_building import ProgramFrames, pose_of_values
@@ -66,7 +66,7 @@ COMMENTS = Table(
             _HEAD,
         ),
         Statement("tolerance", f"{TOLERANCE_HEADING}<length> mm, <angle> rad", _HEAD),
-        Statement("joint targets", f"{BECAUSE}<text>", _HEAD),
+        Statement("joint targets", f"{JOINT_TARGETS_REASON}<text>", _HEAD),
         Statement("times", f"{TIMES_HEADING}<text>", _HEAD),
         Statement(
             "poses", "poses: work object <work:link> of <carrier:link>, flange <flange:link>", _HEAD
@@ -240,7 +240,7 @@ def _of_poses(draft: Draft) -> list[str]:
     names = {"work": frames.name, "carrier": frames.carrier}
     return [
         COMMENTS.text("poses", **names, flange=draft.settings.flange or "-"),
-        COMMENTS.text("planned work object", pose=pin_values(frames.work)),
+        COMMENTS.text("planned work object", pose=pose_values(frames.work)),
         "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
         "Poses are reached in the arm's configuration at the begin, by axes.",
     ]

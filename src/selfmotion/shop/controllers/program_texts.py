@@ -13,17 +13,17 @@ from selfmotion.model.task import SE3, Quaternion
 _MARKS = "/:+#@()[]{}<>|$&=*;!?^"
 # Characters in a line of comments.
 _WIDTH = 100
-# Beginning of the comment that says why targets are joints.
-BECAUSE = "targets are joints, as poses do not keep the motion: "
-# Beginning of the comment that says why a seam with a feed has times all the same.
+# Start of the comment with the reason for joint targets.
+JOINT_TARGETS_REASON = "targets are joints, as poses do not keep the motion: "
+# Start of the comment with the reason why a seam with a feed is programmed with times.
 TIMES_HEADING = "with times: "
-# Beginning of the comment that says which tolerance seams at speeds keep.
+# Start of the comment with the tolerance of seams with a programmed feed.
 TOLERANCE_HEADING = "kept of what is prescribed: "
-# Beginning of the comment with the planned duration of a segment at speeds.
+# Start of the comment with the planned duration of a segment with a programmed feed.
 DURATION_HEADING = "planned time: "
 
 
-def pin_values(pose: SE3) -> list[float]:
+def pose_values(pose: SE3) -> list[float]:
     """Return a pose as position [m] and quaternion x, y, z, w."""
     quaternion = Quaternion(pose.rotation).coeffs()
     return [float(value) + 0.0 for value in (*pose.translation, *quaternion)]
@@ -39,7 +39,7 @@ _IN_ASCII = str.maketrans({"→": "->", "°": " deg", "µ": "u"})
 
 
 def plain(text: str) -> str:
-    """Return a text as a comment may hold it: one line of ASCII."""
+    """Return a text as one line of ASCII, as comments need it."""
     return " ".join(text.translate(_IN_ASCII).encode("ascii", "replace").decode().split())
 
 
@@ -54,7 +54,7 @@ def of_word(word: str) -> str:
 
 
 def folded(text: str) -> list[str]:
-    """Return a text in lines, those after the first with two dots ahead."""
+    """Return a text wrapped into lines; all but the first begin with two dots."""
     lines, words = [""], text.split(" ")
     for word in words:
         if lines[-1] and len(lines[-1]) + len(word) > _WIDTH:
@@ -64,7 +64,7 @@ def folded(text: str) -> list[str]:
 
 
 def module_name(file: FilePath, most: int, reserved: Sequence[str]) -> str:
-    """Return the name that a file's module has to have; words of its language are none.
+    """Return the name of a file's module; reserved words of the language are refused.
 
     Raises
     ------

@@ -277,7 +277,7 @@ def base_of(robot: RobotModel) -> str:
 
 
 def turned_base(robot: RobotModel) -> str:
-    """Return how the controller's base frame is rotated from the root, in words; "" if it is not."""
+    """Return how the controller's base is rotated from the root, in words; "" if it is not."""
     base = base_of(robot)
     if base == WORLD:
         return ""

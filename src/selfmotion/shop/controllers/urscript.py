@@ -17,7 +17,7 @@ from selfmotion.shop.controllers.pose_numbers import urscript_numbers, urscript_
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings
-from selfmotion.shop.controllers.program_texts import pin_values
+from selfmotion.shop.controllers.program_texts import pose_values
 from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
 from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
@@ -100,7 +100,7 @@ def _write_pose(pose: WrittenPose) -> str:
 
 
 def _write_frame(pose: SE3) -> str:
-    values = np.array(pin_values(pose))
+    values = np.array(pose_values(pose))
     return f"p{_write_numbers(urscript_numbers(values[:3], values[3:]))}"
 
 
