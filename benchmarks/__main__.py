@@ -118,6 +118,10 @@ BENCHMARKS = {
         "the page of `selfmotion view`: from the release of a handle or slider to the verdict",
         Run("view.py", short="--repeats 1"),
     ),
+    "view_browser": Benchmark(
+        "the same page in Chromium: each handle dragged, each slider moved, and what it shows last",
+        Run("view_browser.py", short="--repeats 1 --only Panda"),
+    ),
     "redundancy_map": Benchmark(
         "redundancy maps of the suite's problems against brute force, pixel by pixel",
         Run(

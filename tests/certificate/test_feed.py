@@ -222,7 +222,7 @@ def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
         robot, still = gantry(tmp_path), np.zeros((2, 4))
         motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
         segments = MotionSegments(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
-        follow = sm.Follows.of(robot, path, "position").only
+        follow = sm.Follows.of(robot, path, "position").items[0]
         known = _Along(follow, LEFT).series(segments)
         assert (known is None) is bool(told)
 
@@ -232,7 +232,7 @@ def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path:
     t = path.marks[np.append(True, np.diff(path.marks) > 1e-3)]
     wild = [rng.normal(size=(len(t), 4)) for _ in range(3)]
     motion = sm.Trajectory(t, *wild[:2], robot.joint_names, wild[2])
-    follow = sm.Follows.of(robot, path, "position").only
+    follow = sm.Follows.of(robot, path, "position").items[0]
     segments = MotionSegments(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
     alone = np.isin(t[1:], path.marks[1:][np.diff(path.marks) > 1e-3])
     check_majorants(_Along(follow, LEFT), segments.some(np.flatnonzero(alone)))

@@ -59,7 +59,11 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     def check(tolerance: float, *relaxed: sm.Relaxation) -> Any:
         given = sm.Tolerance(tolerance, 1e-6)
         return bound_errors(
-            robot, Follows.of(robot, Swinging(), sm.Task.PLANAR).only, trajectory, given, relaxed
+            robot,
+            Follows.of(robot, Swinging(), sm.Task.PLANAR).items[0],
+            trajectory,
+            given,
+            relaxed,
         )
 
     for tolerance in (1.001e-4, 1e-4 / 1.001):
@@ -109,7 +113,7 @@ def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
             given = sm.Tolerance(allowed, allowed)
             path = Arched(float(top))
             found = bound_errors(
-                robot, Follows.of(robot, path, sm.Task.POSE).only, trajectory, given, ()
+                robot, Follows.of(robot, path, sm.Task.POSE).items[0], trajectory, given, ()
             )
             value = (found.rotation if angular else found.position).value
             assert most - ROUNDING <= value <= 1.01 * most
@@ -125,7 +129,7 @@ def test_errors_of_every_row_count(row: int, relaxed: tuple[str, str] | None) ->
     path = sm.paths.Waypoints.from_poses([0.0, 1.0], [beside, beside])
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
     bands = [] if relaxed is None else [sm.Relaxation(relaxed[0], 1e-9, axes=relaxed[1])]
-    follow = Follows.of(robot, path, sm.Task.POSE).only
+    follow = Follows.of(robot, path, sm.Task.POSE).items[0]
     found = bound_errors(robot, follow, trajectory, sm.Tolerance(1.0, 1.0), bands)
     expected = [size, 0.0] if row < 3 else [0.0, size]
     errors = [found.position.value, found.rotation.value]
@@ -163,7 +167,7 @@ def test_between_samples_however_near_the_arm_may_go_anywhere(gap: float) -> Non
     motion = sm.Trajectory(t, spiked, np.zeros((5, 7)), robot.joint_names)
     path = sm.paths.Dwell(robot.pose(q), 1.0)
     found = bound_errors(
-        robot, Follows.of(robot, path, sm.Task.POSE).only, motion, sm.Tolerance(), ()
+        robot, Follows.of(robot, path, sm.Task.POSE).items[0], motion, sm.Tolerance(), ()
     )
     assert found.position.value > 1e-4
     assert found.position.time == pytest.approx(0.5, abs=2e-6)
@@ -187,7 +191,7 @@ def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
     allowed = sm.Tolerance(1e-4 * (1.0 + 1e-9), 1.0)
     found = bound_errors(
-        robot, Follows.of(robot, Bent(), sm.Task.PLANAR).only, trajectory, allowed, ()
+        robot, Follows.of(robot, Bent(), sm.Task.PLANAR).items[0], trajectory, allowed, ()
     )
     ((start, end),) = found.undecided
     assert start <= 1.0 / 3.0 <= end

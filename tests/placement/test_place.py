@@ -516,7 +516,13 @@ def test_a_map_of_places_has_contours_and_tells_what_is_out_of_reach() -> None:
     reasons = [["" if np.isfinite(cost) else "no motion" for cost in row] for row in costs]
     reasons[4][4] = "out of reach at t = 0 s"
     shown = sm.placement.PlaceMap(
-        ("x", "y"), across, up, costs, tuple(map(tuple, reasons)), np.array([[-0.1, 0.1]])
+        ("x", "y"),
+        across,
+        up,
+        costs,
+        tuple(map(tuple, reasons)),
+        best=np.array([[-0.1, 0.1]]),
+        outline=np.empty((0, 2)),
     )
     drawn = picture_of(shown)
     told = [word for word in ("+5%", "+10%", "+25%", "+50%") if word in drawn]

@@ -6,6 +6,8 @@ import inspect
 import re
 import subprocess
 import sys
+from contextlib import suppress
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
@@ -92,11 +94,21 @@ def misnamed(source: str) -> list[str]:
             if names[0] in FOLDERS:
                 continue
             for name in names:
-                if name not in dir(thing):
+                if name not in dir(thing) and not _is_module_of(thing, name):
                     found.append(said[0])
                     break
                 thing = getattr(thing, name)
     return found
+
+
+def _is_module_of(thing: object, name: str) -> bool:
+    """Import a module of a package, which is not its attribute before; whether there is one."""
+    if not hasattr(thing, "__path__"):
+        return False
+    with suppress(ModuleNotFoundError):
+        import_module(f"{thing.__name__}.{name}")
+        return True
+    return False
 
 
 # Folders and files that are no namespaces, which docstrings name.

@@ -97,6 +97,10 @@ class VirtualJoints:
         hinges, self.task = _hinges(self, task, [row - 3 for row in rows if row >= 3], in_tool)
         self.behind = (*hinges, *(slides if in_tool else ()))
 
+    def __repr__(self) -> str:
+        """Return the names of the joints."""
+        return f"VirtualJoints({', '.join(joint.name for joint in self.each)})"
+
     @property
     def each(self) -> tuple[VirtualJoint, ...]:
         """All of them, in the order of their coordinates."""

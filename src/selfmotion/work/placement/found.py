@@ -57,8 +57,8 @@ class PlaceMap:
     up: Array
     costs: Array
     reasons: tuple[tuple[str, ...], ...]
-    best: Array = field(default_factory=lambda: np.empty((0, 2)))
-    outline: Array = field(default_factory=lambda: np.empty((0, 2)))
+    best: Array
+    outline: Array
 
     def svg(self) -> str:
         """Return an SVG: a cell for each place with its cost, or why it fails as its tooltip."""
