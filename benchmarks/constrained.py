@@ -30,7 +30,7 @@ from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import MinimumNormMotion, Objective, converged_minimum_norm
-from selfmotion.problem.constraints import NO_OVERLAP, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, separate_clearances
 from selfmotion.problem.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
@@ -101,7 +101,7 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
     else:
         raise RuntimeError(f"problem {number} of seed {seed}: no constraints that bind were found")
     start = None if number % FREE == FREE - 1 else free.given_start
-    others, apart = said_once(constraints, NO_OVERLAP)
+    others, apart = separate_clearances(constraints, NO_OVERLAP)
     return sm.Problem(
         robot,
         free.path,

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.problem.constraints import NO_OVERLAP, said_once
+from selfmotion.problem.constraints import NO_OVERLAP, separate_clearances
 from support.oracle import Judge
 from support.own_dynamics import Moving, MovingArm
 from support.own_kinematics import along
@@ -494,7 +494,7 @@ def problem_of(kind: str, number: int) -> tuple[sm.Problem, Known, Asked]:
     found = known(cells[number % len(cells)], rng, closed, turns)
     asked, task = asks(found), cell(found.name)[1]
     followed = _followed(found, task)
-    others, apart = said_once(asked.constraints, NO_OVERLAP)
+    others, apart = separate_clearances(asked.constraints, NO_OVERLAP)
     given = {"constraints": others, "clearance": apart, **asked.options}
     problem = sm.Problem(found.robot, **followed, **given)
     return problem, found, asked
