@@ -14,15 +14,15 @@ help:  ## this list
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
-# The site runs every example, a browser draws every arm and drags on pages: a target of its own.
+# The site runs every example, a browser draws every arm and drags on pages: a target of its own,
+# with other tests that take as long.
 TWO := --numprocesses 2 -m 'not site'
 
 test: $(READY)  ## all tests but those of `test-site`, on two cores
 	$(BIN)/pytest $(TWO) --dist loadfile --no-loadscope-reorder --keep-durations
 
-test-site: $(READY)  ## the site with every example, every arm's replay, and pages of all widths
-	$(BIN)/pytest -m site tests/docs/test_site.py tests/replay/test_browser.py tests/replay/test_layout.py \
-		tests/view/test_browser.py
+test-site: $(READY)  ## long tests: the site, pages in a browser, the study of the paper
+	$(BIN)/pytest -m site tests/docs tests/replay tests/study tests/view tests/whole
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync lint quick

@@ -47,7 +47,14 @@ def commands(page: str) -> list[list[str]]:
 RUN = [page for page in PAGES if blocks(page) and ROOT / page not in shown.PRINTING]
 
 
-@pytest.mark.parametrize("page", RUN)
+# Every part of the package is in the tour, which takes as long.
+LONG = Path("docs/pages/tour.md")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(x, marks=pytest.mark.site if Path(x) == LONG else ()) for x in RUN],
+)
 def test_every_block_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In order, in one folder and one Python; files are those that the page shows."""
     monkeypatch.chdir(tmp_path)

@@ -31,6 +31,7 @@ def pixels(file):
         return np.asarray(picture.convert("RGB"))
 
 
+@pytest.mark.site
 @needs_browser
 def test_a_picture_shows_the_time_asked_for(tmp_path):
     plan = planar_plan()
@@ -44,6 +45,7 @@ def test_a_picture_shows_the_time_asked_for(tmp_path):
     assert sorted(tmp_path.iterdir()) == files
 
 
+@pytest.mark.site
 @needs_browser
 def test_a_gif_lasts_as_long_as_the_motion(tmp_path):
     file = render_gif(planar_plan(), tmp_path / "a.gif", size=(160, 120), frames_per_second=5)
@@ -52,6 +54,7 @@ def test_a_gif_lasts_as_long_as_the_motion(tmp_path):
         assert picture.info["duration"] == 200
 
 
+@pytest.mark.site
 @needs_browser
 def test_the_whole_page_is_taller_than_the_window(tmp_path):
     file = render_png(planar_plan(), tmp_path / "a.png", t=0.0, size=(400, 300), whole_page=True)
@@ -67,6 +70,7 @@ def test_no_browser_is_said_clearly(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.site
 @needs_browser
 def test_pictures_fail_before_work(tmp_path, monkeypatch):
     planar_plan().save(tmp_path / "a.npz")
@@ -141,6 +145,7 @@ def short_folder():
         yield Path(folder)
 
 
+@pytest.mark.site
 @needs_browser
 def test_an_interrupted_picture_leaves_nothing(short_folder):
     folder, temporary = short_folder / "out", short_folder / "tmp"

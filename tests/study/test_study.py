@@ -23,6 +23,9 @@ from selfmotion.paper.study.results import Chapter, Table
 from selfmotion.problem.costs.samples import Samples
 from support.followed import standing
 
+# The whole study, reduced, takes half a minute.
+pytestmark = pytest.mark.site
+
 # Costs of the reading notes are given to four or five decimals.
 PRINTED = 1e-4
 # A Jacobian of many configurations at once, and of one [m, rad].

@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from redundancy_map import Compared, by_brute_force, differences
 from suite import load, plan
 
 from selfmotion.basics import silent
 from support.places import DATA
+
+pytestmark = pytest.mark.site
 
 # Random starts at each pixel: enough for a few columns.
 STARTS = 48
