@@ -143,3 +143,41 @@ def test_plans_keep_the_limits_of_a_file(tmp_path: Path) -> None:
     code, text = invoke(*seam, "--joint-limits", file, "--out", out)
     kept = np.abs(sm.load_plan(out).trajectory.extremes(1)[1]).max()
     assert (code == 0) == (kept <= 0.12), text
+
+
+JOB = """
+task = "pointing"
+joint_limits = "joint_limits.yaml"
+robot = { name = "panda" }
+
+[job]
+start = "home"
+
+[[constraints]]
+kind = "JointPositionLimits"
+
+[[seams]]
+name = "slow"
+constraints = [{ kind = "ToolLimits", speed = 0.03 }, { kind = "Clearance", distance = 0.004 }]
+path = { kind = "circle", radius = 0.05, duration = 8, start = { position = [0.5, 0, 0.5] } }
+
+[[seams]]
+name = "other"
+path = { kind = "circle", radius = 0.05, duration = 8, start = { position = [0.5, 0, 0.5] } }
+"""
+
+
+def test_a_seam_keeps_its_own_constraints_beside_limits_of_a_file(tmp_path: Path) -> None:
+    """Its problem has those of the job first, then its own, then those of the file."""
+    written(tmp_path, PANDA)
+    file = tmp_path / "job.toml"
+    file.write_text(JOB)
+    job = sm.files.read_seam_job(file)
+    slow, other = job.seams
+    tool, clearance = slow.constraints
+    assert (tool.kind, tool.speed) == ("ToolLimits", 0.03)
+    assert (clearance.kind, clearance.distance) == ("Clearance", 0.004)
+    assert other.constraints == ()
+    shared = [one.kind for one in job.settings["constraints"]]
+    assert shared.count("ToolLimits") == 0
+    assert "JointJerkLimits" in shared

@@ -229,6 +229,39 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         sm.read_problem(wrong, allow_code=True)
 
 
+@pytest.mark.parametrize(
+    ("table", "where"),
+    [
+        ("clearance", r"clearance\.obstacles\[0\]"),
+        ("[clearance]", r"clearance\[0\]\.obstacles\[0\]"),
+        ("workpiece", r"workpiece\.obstacles\[0\]"),
+    ],
+)
+def test_a_shape_of_a_users_own_stands_wherever_bodies_do(
+    tmp_path: Path, table: str, where: str
+) -> None:
+    code = """
+    from dataclasses import dataclass
+    import selfmotion as sm
+
+    @dataclass(frozen=True)
+    class PillarOfATest(sm.obstacles.Box):
+        shape = "pillar of a test"
+    """
+    written(tmp_path, "\n".join(line[4:] for line in code.splitlines()), "own_shapes_of_a_test.py")
+    body = '{ shape = "own_shapes_of_a_test:PillarOfATest", name = "p", position = [0, 1, 0], '
+    body += "size = [0.1, 0.1, 1] }"
+    own = 'task = "pointing"\nrobot = { name = "panda" }\n'
+    own += 'path = { kind = "circle", radius = 0.1, duration = 4, '
+    own += "start = { position = [1, 0, 0] } }\n"
+    file = written(tmp_path, f"{own}[{table}]\nobstacles = [{body}]\n")
+    with pytest.raises(sm.errors.FileFormatError, match=rf"{where}\.shape.*--allow-code"):
+        sm.read_problem(file)
+    problem = sm.read_problem(file, allow_code=True)
+    bodies = [body for one in problem.clearances for body in one.obstacles]
+    assert [(type(body).__name__, body.name) for body in bodies] == [("PillarOfATest", "p")]
+
+
 def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
     grid = CELL.replace("lock =", "base = { position = [0, 0, 0] }\nlock =")
     grid += '[grid]\n"robot.base.position" = [[0, 0, 1e-9], [0, 0, 2e-9]]\n'

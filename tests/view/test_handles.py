@@ -54,6 +54,10 @@ CASES = {
         **document(kind="circle", radius=0.1, duration=4.0, start=START),
         "clearance": {"obstacles": [BOX]},
     },
+    "an obstacle of the second clearance": {
+        **document(kind="circle", radius=0.1, duration=4.0, start=START),
+        "clearance": [{"distance": 0.002}, {"obstacles": [BOX]}],
+    },
     "an obstacle on a link": {
         **document(kind="circle", radius=0.1, duration=4.0, start=START),
         "robot": {"name": "panda", "base": FRAME},
@@ -195,6 +199,10 @@ def test_sliders_are_what_the_document_says() -> None:
     for slider in found.values():
         assert slider.low <= slider.value <= slider.high
     assert "clearance" not in sliders_of({**given, "clearance": False}, given)
+    several = {**given, "clearance": [{"distance_mm": 5}, {"distance": 0.01, "obstacles": [BOX]}]}
+    keys = [slider.keys for slider in sliders_of(several, several).values()]
+    assert ("clearance", 0, "distance_mm") in keys
+    assert ("clearance", 1, "distance") in keys
 
 
 def test_costs_of_one_kind_have_a_slider_each() -> None:

@@ -180,18 +180,18 @@ def _rough(formulation: Formulation, judged: Judged) -> bool:
     """Whether a required condition holds at the nodes, but not between them."""
     if judged.part.solution.violations or not judged.certificate.on_path:
         return False
-    is_default = {item.name for item in formulation.problem.requirements}
-    # The arm's own limits always apply.
-    is_default |= set(LIMIT_NAMES[:2])
+    requirements = formulation.problem.requirements
     if formulation.no_overlap is not None:
-        # It need not have been a constraint of the nodes.
-        is_default.discard(formulation.problem.requirements[-1].name)
+        # It comes last, and need not have been a constraint of the nodes.
+        requirements = requirements[:-1]
+    # The arm's own limits always apply.
+    required = {item.name for item in requirements} | set(LIMIT_NAMES[:2])
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(
         item.requirement in LIMIT_NAMES or item.time not in nodes
         for item in judged.certificate.findings
-        if not item.satisfied and item.requirement in is_default
+        if not item.satisfied and item.requirement in required
     )
 
 

@@ -35,7 +35,7 @@ from selfmotion.model.path import (
 )
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Task
-from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import Cost
 from selfmotion.shop.cam import read_path
 
@@ -52,6 +52,7 @@ _FAMILIES: Mapping[str, type[Saved]] = {
     "null_motion": NullMotion,
     "costs": Cost,
     "constraints": Constraint,
+    "clearance": Clearance,
 }
 
 
@@ -90,15 +91,20 @@ def name_kinds(
                     f"{where}.kind: '{item['kind']}' is {value!r}, expected a class derived from "
                     f"{public_name(family)}" + (" or a function" * (section == "costs"))
                 )
-            if isinstance(item.get("obstacles"), list):
-                _name_shapes(item["obstacles"], where, folder, allowed)
+            _name_shapes(item, "obstacles", where, folder, allowed)
+    for section, key in (("workpiece", "obstacles"), ("robot", "bodies")):
+        if isinstance(table.get(section), dict):
+            _name_shapes(table[section], key, section, folder, allowed)
     return functions
 
 
-def _name_shapes(listed: list[Any], where: str, folder: FilePath, allowed: bool) -> None:
-    for k, item in enumerate(listed):
+def _name_shapes(
+    table: dict[str, Any], key: str, where: str, folder: FilePath, allowed: bool
+) -> None:
+    listed = table.get(key)
+    for k, item in enumerate(listed if isinstance(listed, list) else ()):
         if isinstance(item, dict):
-            place = f"{where}.obstacles[{k}].shape"
+            place = f"{where}.{key}[{k}].shape"
             value = _code(item.get("shape"), place, folder, allowed)
             if isinstance(value, type) and issubclass(value, Obstacle):
                 item["shape"] = value.shape

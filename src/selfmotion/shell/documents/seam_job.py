@@ -442,10 +442,13 @@ class _Reader:
 
 
 def _besides(problem: Problem, shared: Sequence[Any], own: Sequence[Any]) -> list[Constraint]:
-    """Return what a seam's own tables of constraints are read as, after those that it shares."""
-    (before, _), (mine, others) = _by_kind(shared), _by_kind(own)
-    apart = problem.clearances[before : before + mine]
-    return [*(problem.constraints[-others:] if others else ()), *apart]
+    """Return what a seam's own tables of constraints are read as.
+
+    Its problem has those that it shares first, then its own, then limits of a file.
+    """
+    (first, before), (mine, others) = _by_kind(shared), _by_kind(own)
+    clearances = problem.clearances[first : first + mine]
+    return [*problem.constraints[before : before + others], *clearances]
 
 
 def _by_kind(tables: Sequence[Any]) -> tuple[int, int]:

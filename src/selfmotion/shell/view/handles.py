@@ -239,7 +239,10 @@ def _bodies(table: Any) -> list[Any]:
 
 def _of_obstacles(document: Mapping[str, Any], problem: Problem) -> Iterator[Handle]:
     robot = problem.robot
+    given = document.get("clearance")
     places: list[Keys] = [("clearance",)]
+    if isinstance(given, list):
+        places = [("clearance", k) for k in range(len(given))]
     places += [
         ("constraints", k)
         for k, item in enumerate(document.get("constraints", []))

@@ -109,24 +109,27 @@ def _about(
 
 
 def _clearance(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterator[Slider]:
-    """Return the slider of the distance that bodies keep."""
+    """Return a slider for each distance that bodies keep."""
     tables: list[Keys] = [
         ("constraints", k)
         for k, item in enumerate(document.get("constraints", []))
         if item.get("kind") == "Clearance"
     ]
     # Without one of its own a problem keeps the arm off itself, unless it says false.
-    if not tables and (isinstance(document.get("clearance", {}), Mapping)):
+    given = document.get("clearance", {})
+    if isinstance(given, list):
+        tables += [("clearance", k) for k in range(len(given))]
+    elif not tables and isinstance(given, Mapping):
         tables = [("clearance",)]
-    for keys in tables:
+    for number, keys in enumerate(tables, start=1):
+        name = "clearance" if len(tables) == 1 else f"clearance {number}"
         key = "distance_mm" if at(document, (*keys, "distance_mm")) is not None else "distance"
         unit, most = ("mm", 1e3 * _CLEARANCES) if key.endswith("_mm") else ("m", _CLEARANCES)
         value = at(document, (*keys, key))
         value = float(value) if _is_number(value) else 0.0
         first = at(begun, (*keys, key))
         high = max(most, 2.0 * value, 2.0 * first if _is_number(first) else 0.0)
-        yield Slider("clearance", (*keys, key), value, 0.0, high, unit, even=True)
-        return
+        yield Slider(name, (*keys, key), value, 0.0, high, unit, even=True)
 
 
 def _is_number(value: Any) -> bool:
