@@ -172,8 +172,11 @@ class _ByPath:
 
 def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
     """Whether self-collision, which was not looked at before, is the only violation."""
-    is_default = formulation.no_overlap is not None and len(certificate.failures) == 1
-    return is_default and not certificate.findings[-1].satisfied
+    if formulation.no_overlap is None or len(certificate.failures) != 1:
+        return False
+    # The finding of the last requirement; those of feeds come after it.
+    feeds = sum(len(item.path.feeds) for item in formulation.problem.follows.items)
+    return not certificate.findings[-1 - feeds].satisfied
 
 
 def _rough(formulation: Formulation, judged: Judged) -> bool:
