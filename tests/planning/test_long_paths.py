@@ -42,8 +42,8 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
     return sm.Problem(planar, path, "planar", first, constraints=limits, rest=False)
 
 
-def planner_of(problem: sm.Problem) -> Planner:
-    effort = Effort(None, None, None, Counts())
+def planner_of(problem: sm.Problem, optimizer: sm.QuasiNewton | None = None) -> Planner:
+    effort = Effort(optimizer, None, None, Counts())
     setup = Setup(Formulation.of(problem), sm.Search(), sm.Tolerance(), silent)
     return Planner(setup, effort)
 
@@ -83,11 +83,11 @@ def test_a_given_start_is_kept_and_left_for_the_better_posture(
     assert free.report.cost <= plan.report.cost <= free.report.cost * (1.0 + GIVEN)
 
 
-def test_short_paths_and_other_null_motions_go_the_usual_way(planar: sm.RobotModel) -> None:
+def test_short_paths_and_the_published_method_go_the_usual_way(planar: sm.RobotModel) -> None:
     few, many = loops(planar, 2), loops(planar, 15)
-    cubic = sm.Problem(planar, many.path, "planar", null_motion=sm.PolynomialNullMotion())
-    for problem, long in ((few, False), (many, True), (cubic, False)):
-        assert is_long(planner_of(problem)) is long
+    assert not is_long(planner_of(few))
+    assert is_long(planner_of(many))
+    assert not is_long(planner_of(many, sm.QuasiNewton()))
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ class Effort:
     Attributes
     ----------
     optimizer : Optimizer or None
-        Of the published method, if requested.
+        Of the published method; None where Newton's method on nodes is used.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None

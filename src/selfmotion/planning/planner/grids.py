@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.follow import linear_rows, window_edges
-from selfmotion.model.motion import FreeNullMotion, Grid
+from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import NodeMotion, on_grid, rest_times
 from selfmotion.planning.planner.effort import Effort
@@ -31,17 +31,11 @@ NOTHING = 1e-4
 UNKEPT = 10.0
 
 
-def uses_published_method(formulation: Formulation, effort: Effort) -> bool:
-    """Whether the published method is requested: by a null motion, an optimiser, or damping."""
-    own = isinstance(formulation.problem.null_motion, FreeNullMotion) and effort.optimizer is None
-    return not own or formulation.problem.damping_law is not None
-
-
 def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:
     """Whether a formulation is optimised on nodes: by default, if it has a self-motion."""
     follows = formulation.follows
     free = follows.redundancy == follows.dof - follows.dimension > 0
-    return free and not uses_published_method(formulation, effort)
+    return free and effort.optimizer is None
 
 
 def most_nodes(formulation: Formulation) -> int:

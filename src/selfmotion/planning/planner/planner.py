@@ -12,7 +12,6 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import Guide
 from selfmotion.planning.planner.effort import Effort
-from selfmotion.planning.planner.grids import uses_published_method
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.judging import Judged
 from selfmotion.planning.planner.screening import Ranking
@@ -106,7 +105,7 @@ class Planner:
 
         Of the published method's, these are given ends alone.
         """
-        published = uses_published_method(self.formulation, self.effort)
+        published = self.effort.optimizer is not None
         return self.incumbent is None or not (published or self.incumbent.will_do)
 
     def guess(

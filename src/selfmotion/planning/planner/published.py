@@ -13,26 +13,26 @@ from selfmotion.model.motion import (
 )
 from selfmotion.model.robot import null_space
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.optimise import QuasiNewton, Status
+from selfmotion.planning.optimise import Optimizer, Status
 from selfmotion.planning.paper import Method, Objective
 from selfmotion.planning.planner.guess import Guess, pace_of
 from selfmotion.planning.planner.outcomes import PublishedOutcome
 from selfmotion.planning.planner.solution import Solution
 
 
-def solve_as_published(solution: Solution) -> Solution:
+def solve_as_published(solution: Solution, optimizer: Optimizer) -> Solution:
     """Return the optimum of the published method, on its grids, or on that of the solution."""
     before = solution.outcome
     if isinstance(before, PublishedOutcome):
         found = before.again()
     else:
-        begun = _first(solution.guess)
+        begun = _first(solution.guess, optimizer)
         found = replace(begun, x=_first_coefficients(begun, solution.guess)).settled()
     ended = Status.INTERRUPTED if found.status is Status.INTERRUPTED else solution.ended
     return replace(solution, outcome=found, history=tuple(found.history), ended=ended)
 
 
-def _first(guess: Guess) -> PublishedOutcome:
+def _first(guess: Guess, optimizer: Optimizer) -> PublishedOutcome:
     """Return the minimum-norm motion as the start of the published method."""
     effort, formulation, begun = guess.effort, guess.formulation, guess.minimum_norm.motion
     if isinstance(formulation.problem.null_motion, FreeNullMotion):
@@ -40,9 +40,8 @@ def _first(guess: Guess) -> PublishedOutcome:
         formulation = Formulation.of(polynomial)
     ends, most = guess.conditions.ends, effort.max_evaluations
     limit = None if most is None else effort.counts.evaluations + most
-    own = QuasiNewton() if effort.optimizer is None else effort.optimizer
     method = Method(
-        formulation, begun, guess.free, ends, own, effort.counts, limit, effort.callback
+        formulation, begun, guess.free, ends, optimizer, effort.counts, limit, effort.callback
     )
     objective = Objective.of(
         formulation,

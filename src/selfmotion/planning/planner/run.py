@@ -21,10 +21,10 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.model.follow import completed
+from selfmotion.model.motion import FreeNullMotion
 from selfmotion.planning.formulation import Formulation, arm_motion, motion_of_all
-from selfmotion.planning.optimise import Callback, Optimizer, Status
+from selfmotion.planning.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
-from selfmotion.planning.planner.grids import uses_published_method
 from selfmotion.planning.planner.guess import check_warm_start
 from selfmotion.planning.planner.judging import Judged
 from selfmotion.planning.planner.planner import Planner
@@ -79,7 +79,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
             check,
             ending=part.ending,
             notes=planner.notes,
-            published=uses_published_method(planner.formulation, planner.effort),
+            published=planner.effort.optimizer is not None,
         ),
         seconds=time.perf_counter() - planner.began,
         gap=_gap(planner, judged),
@@ -252,9 +252,10 @@ def plan(
     clock = Deadline.after(deadline)
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _DAMPED_EVALUATIONS
+    optimizer = _published_optimizer(problem, optimizer)
     effort = Effort(optimizer, callback, max_evaluations, clock)
     formulation = Formulation.of(problem)
-    if problem.relaxations and uses_published_method(formulation, effort):
+    if problem.relaxations and optimizer is not None:
         raise ProblemError(
             "relaxations: the published method keeps nothing but given ends, so that the tool "
             "would leave its tolerances; leave null_motion out, optimizer and damping too"
@@ -285,12 +286,23 @@ def plan(
 def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress: Progress) -> Plan:
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline()
-    effort = Effort(None, None, None, clock)
+    effort = Effort(_published_optimizer(problem, None), None, None, clock)
     formulation = Formulation.of(problem)
     guide = replace(guide, q=completed(formulation.follows, guide.t, guide.q))
     planner = Planner(Setup(formulation, Search(), tolerance, progress, guide=guide), effort)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)
+
+
+def _published_optimizer(problem: Problem, optimizer: Optimizer | None) -> Optimizer | None:
+    """Return the optimiser of the published method; None where Newton's method on nodes is used.
+
+    The published method is requested by an optimiser, by a null motion, or by damping.
+    """
+    is_free = isinstance(problem.null_motion, FreeNullMotion)
+    if optimizer is None and is_free and problem.damping_law is None:
+        return None
+    return QuasiNewton() if optimizer is None else optimizer
 
 
 def _planned(planner: Planner, clock: Deadline) -> Plan:

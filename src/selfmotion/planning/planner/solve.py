@@ -11,7 +11,7 @@ from selfmotion.planning.formulation import (
     require_finite_values,
 )
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.planner.grids import is_on_nodes, uses_published_method
+from selfmotion.planning.planner.grids import is_on_nodes
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.local_search import LocalSearch
 from selfmotion.planning.planner.outcomes import NodeOutcome, on_the_way
@@ -45,8 +45,8 @@ def solve_again(solution: Solution, cost_to_beat: float = np.inf) -> Solution:
         return solution
     if not np.isfinite(guess.minimum_norm.cost):
         require_finite_values(guess.formulation.costs, guess.minimum_norm.sampled.arm)
-    if uses_published_method(guess.formulation, guess.effort):
-        return solve_as_published(solution)
+    if guess.effort.optimizer is not None:
+        return solve_as_published(solution, guess.effort.optimizer)
     if not is_on_nodes(guess.formulation, guess.effort):
         return solution
     before = solution.outcome

@@ -22,7 +22,7 @@ from selfmotion.certificate import arm_limits
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Search
-from selfmotion.planning.planner.grids import is_on_nodes, uses_published_method
+from selfmotion.planning.planner.grids import is_on_nodes
 from selfmotion.planning.planner.guess import on_start
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.proposals import (
@@ -348,10 +348,7 @@ def _find_obstruction(planner: Planner) -> bool:
     judged, formulation = planner.judged, planner.formulation
     if judged is None or judged.certificate.verified or judged.part.solution.cut_short:
         return False
-    if (
-        uses_published_method(formulation, planner.effort)
-        or formulation.problem.damping_law is not None
-    ):
+    if planner.effort.optimizer is not None:
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
