@@ -76,8 +76,6 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
     lower, upper = robot.finite_limits()
     for _ in range(3):
         s = rng.uniform(-0.6, 0.6, (1, len(virtual.each)))
-        if virtual.swing is not None:
-            s[:, virtual.swing[1]] = s[:, virtual.swing[0]]
         q = np.hstack([rng.uniform(lower, upper)[None], s])
         # Where all is followed is where the joints put it; what deviates is the arm's own tool.
         pose, tool = follows.items[0].chain.place(q[0]), robot.pose(q[0, :n])
@@ -211,8 +209,6 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
         for off in OFF:
             s = np.zeros(len(virtual.each))
             s[k] = off
-            if virtual.swing is not None and k == virtual.swing[0]:
-                s[virtual.swing[1]] = off
             q = np.tile(np.append(start, s), (5, 1))
             whole = sampled_along(formulation, sampling, q, np.zeros_like(q))
             for item in formulation.conditions(q[0], q[1], apart=False).every:
@@ -328,9 +324,6 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]
     far = np.where(np.isfinite(bands), bands, 1.0)
     q[:, -count:] = far * np.random.default_rng(2).normal(scale=0.7, size=(40, count))
-    if follows.virtual.swing is not None:
-        first, second = follows.virtual.swing
-        q[:, robot.dof + second] = q[:, robot.dof + first]
     most = band_limits(follows, q)
     there = np.clip(q, -most, most)
     for item in relaxations:

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.model.follow.extended_chain import ExtendedChain
 from selfmotion.model.follow.follow import BoundTaskFrame, Follows
-from selfmotion.model.follow.table_chain import TableChain
 from selfmotion.model.follow.virtual_joints import VirtualJoints
-from selfmotion.model.path import Dwell, Path
+from selfmotion.model.path import Path
 from selfmotion.model.robot import mean_lever
-from selfmotion.model.task import SE3, Relaxation, Task
+from selfmotion.model.task import Relaxation
 
 # Share of a band that a motion put back into it uses.
 _INSIDE = 0.999
@@ -26,15 +26,13 @@ def with_tolerances(follows: Follows, relaxations: Sequence[Relaxation]) -> Foll
     n = arm.dof
     dof = n + len(virtual.each)
 
-    def bound(item: BoundTaskFrame, table: Array, task: Task) -> BoundTaskFrame:
-        return BoundTaskFrame(TableChain(item.chain.tip_name, table, dof), item.path, task)
-
-    items = [bound(first, virtual.table(first.chain, n), virtual.task)]
-    items += [bound(item, item.chain.table, item.task) for item in others]
-    alike = virtual.alike(n)
-    if alike is not None:
-        at_rest = Dwell(SE3.Identity(), follows.duration)
-        items.append(BoundTaskFrame(TableChain("", alike, dof), at_rest, cast(Task, _Alike())))
+    items = [
+        BoundTaskFrame(ExtendedChain(item.chain, table, dof), item.path, task)
+        for item, table, task in (
+            (first, virtual.table(first.chain, n), virtual.task),
+            *((item, item.chain.table, item.task) for item in others),
+        )
+    ]
     return Follows(arm, tuple(items), virtual)
 
 
@@ -89,11 +87,7 @@ def limits_within(follows: Follows, item: Relaxation, band: float = np.inf) -> A
     first = follows.robot.dof
     for k, joint in enumerate(virtual.each):
         if joint.row in item.indices:
-            # The first hinge of a tilt turns by half of it.
-            halved = virtual.swing is not None and k == virtual.swing[0]
-            share = 0.5 if halved else 1.0
-            most = min(band, virtual.widest([joint.row]))
-            found[first + k] = share * most / joint.scale
+            found[first + k] = min(band, virtual.widest([joint.row])) / joint.scale
     return found
 
 
@@ -128,12 +122,11 @@ def windows_shut(follows: Follows) -> Follows:
     none = np.zeros(follows.robot.dof, dtype=np.bool_)
     held = np.append(none, follows.virtual.windowed)
 
-    def shut(item: BoundTaskFrame) -> BoundTaskFrame:
-        own = item.chain
-        chain = TableChain(own.tip_name, own.table, follows.dof, held)
-        return BoundTaskFrame(chain, item.path, item.task)
-
-    return replace(follows, items=tuple(shut(item) for item in follows.items))
+    items = (
+        replace(item, chain=cast(ExtendedChain, item.chain).with_held(held))
+        for item in follows.items
+    )
+    return replace(follows, items=tuple(items))
 
 
 def window_edges(follows: Follows) -> tuple[float, ...]:
@@ -141,26 +134,3 @@ def window_edges(follows: Follows) -> tuple[float, ...]:
     relaxations = follows.virtual.relaxations
     ends = {x for item in relaxations for x in item.window(follows.duration)}
     return tuple(sorted(ends - {0.0, follows.duration}))
-
-
-class _Alike:
-    """The one row in which two hinges of a tilt turn alike; see `Task`."""
-
-    rows = np.zeros(1, dtype=np.intp)
-    dimension, tool_axes, angular, row_names = 1, False, False, ("tilt",)
-
-    def select(self, twists: Array, rotation: Array) -> Array:
-        """See `Task.select`."""
-        return twists[:1]
-
-    def select_along(self, twists: Array, rotations: Array) -> Array:
-        """See `Task.select_along`."""
-        return np.ascontiguousarray(twists[:, :1])
-
-    def twist_error(self, target: Any, actual: Any) -> Array:
-        """See `Task.twist_error`."""
-        return np.concatenate([target.translation - actual.translation, np.zeros(3)])
-
-    def miss(self, target: Any, actual: Any) -> tuple[float, float]:
-        """See `Task.miss`."""
-        return float(abs(target.translation[0] - actual.translation[0])), 0.0

@@ -9,8 +9,8 @@ twist: with hinges about the rows' axes i and j,
     exp([δ]×) = R_i(α) R_j(2β) R_i(α),   δ = 2 θ/sin θ (sin α cos β, sin β),   cos θ = cos α cos β,
 
 since a product of quaternions that reads the same from both sides has no part along the third axis.
-Its first and last hinge are two joints, and that they turn alike is one row more that is followed.
-Where the third row is relaxed, too, a hinge about it comes first. Of a task that prescribes where
+Its first and last hinge share one coordinate: a joint that is split. Where the third row is
+relaxed, too, a hinge about it comes first. Of a task that prescribes where
 the tool's axis points, tilting it needs no third hinge, unless rows have bands of their own.
 
 A virtual joint's coordinate is 1 at the tool's band, or at a radian, or at the distance that a
@@ -55,6 +55,8 @@ class VirtualJoint:
         Of |coordinate|.
     sign : float
         Of its axis.
+    is_split : bool
+        Whether it is two hinges, before and after the next one, that turn by half each.
     """
 
     name: str
@@ -64,6 +66,7 @@ class VirtualJoint:
     row: int | None = None
     limit: float = np.inf
     sign: float = 1.0
+    is_split: bool = False
 
 
 class VirtualJoints:
@@ -108,18 +111,8 @@ class VirtualJoints:
 
     def label(self, number: int) -> str:
         """Return in words the deviation that one of them allows."""
-        row, of = self.each[number].row, ""
-        if self.swing is not None and number in self.swing:
-            row, of = self.each[self.swing[0]].row, "half of "
-        if row is None:
-            return "a turn that is not prescribed"
-        return f"{of}the deviation {ROW_NAMES[row]}"
-
-    @cached_property
-    def swing(self) -> tuple[int, int] | None:
-        """Numbers of the two hinges of a tilt, which turn alike; None without a tilt."""
-        alike = [k for k, joint in enumerate(self.each) if joint.name.startswith("tilt")]
-        return (alike[0], alike[2]) if len(alike) == 3 else None
+        row = self.each[number].row
+        return "a turn that is not prescribed" if row is None else f"the deviation {ROW_NAMES[row]}"
 
     def held(self, t: Array) -> Flags:
         """Return the mask of joints held at times t (K,), outside of all windows, (K, v)."""
@@ -138,36 +131,24 @@ class VirtualJoints:
     @cached_property
     def at_zero(self) -> Flags:
         """Which joints are at 0 where the tool is on its path itself, (v,)."""
-        return np.array([joint.row is not None or joint.name == "tilt back" for joint in self.each])
+        return np.array([joint.row is not None for joint in self.each])
 
     def table(self, chain: Chain, first: int) -> Array:
         """Return the table of an arm's chain with them; coordinates start at number `first`."""
-        own, count = chain.table, len(self.under)
-        extra = np.zeros((count + len(self.behind), 6, 3))
+        own, passed = chain.table, _passed(self)
+        count = len(self.under)
+        extra = np.zeros((len(passed), 6, 3))
         extra[:, ROTATION:] = np.eye(3)
-        for k, joint in enumerate(self.each):
-            extra[k, JOINT] = first + k, joint.turns, joint.scale
-            extra[k, AXIS, joint.axis] = joint.sign
+        for row, (k, share) in zip(extra, passed, strict=True):
+            joint = self.each[k]
+            row[JOINT] = first + k, joint.turns, share * joint.scale
+            row[AXIS, joint.axis] = joint.sign
         table = np.concatenate([extra[:count], own[:-1], extra[count:], own[-1:]])
         if self.behind:
             # The arm's tip is where the first of them is.
-            place = len(table) - 1 - len(self.behind)
+            place = count + len(own) - 1
             table[place, POSITION], table[place, ROTATION:] = own[-1, POSITION], own[-1, ROTATION:]
             table[-1, POSITION], table[-1, ROTATION:] = 0.0, np.eye(3)
-        return table
-
-    def alike(self, first: int) -> Array | None:
-        """Return the table of two slides that are at 0 where a tilt's hinges turn alike, or None.
-
-        Their coordinates are those of the hinges, from number `first` on.
-        """
-        if self.swing is None:
-            return None
-        table = np.zeros((3, 6, 3))
-        table[:, ROTATION:] = np.eye(3)
-        table[:, JOINT, 0] = first + self.swing[0], first + self.swing[1], -1.0
-        table[:2, JOINT, 2] = 1.0
-        table[:2, AXIS, 0] = 1.0, -1.0
         return table
 
     def weights(self, metre: float) -> Array:
@@ -234,11 +215,11 @@ class VirtualJoints:
             rest = Rotation.from_rotvec(-angle[:, None] * np.eye(3)[joint.axis])
             q = (rest * Rotation.from_quat(np.column_stack([vector, real]))).as_quat(canonical=True)
             vector, real = q[:, :3], q[:, 3]
-        if len(tilting) == 3:
-            i, j = self.each[tilting[0]].axis, self.each[tilting[1]].axis
+        if tilting and self.each[tilting[0]].is_split:
+            i, j = (self.each[k].axis for k in tilting)
             beta, alpha = np.arcsin(vector[:, j]), np.arctan2(vector[:, i], real)
-            for k, angle in zip(tilting, (alpha, 2.0 * beta, alpha), strict=True):
-                found[:, k] = angle / self.each[k].scale
+            for k, half in zip(tilting, (alpha, beta), strict=True):
+                found[:, k] = 2.0 * half / self.each[k].scale
         elif tilting:
             # R_i(a) R_j(b) takes the path's z axis to the tool's.
             axis = (np.swapaxes(turns, 1, 2) @ wanted[:, :, 2:])[:, :, 0]
@@ -247,6 +228,19 @@ class VirtualJoints:
             for k, angle in zip(tilting, (alpha, beta), strict=True):
                 found[:, k] = angle / self.each[k].scale
         return found
+
+
+def _passed(joints: VirtualJoints) -> list[tuple[int, float]]:
+    """Return the joints as the chain passes them: the number of each, and the share of its angle.
+
+    A joint that is split is passed twice.
+    """
+    passed = [(k, 1.0) for k in range(len(joints.each))]
+    for k, joint in enumerate(joints.each):
+        if joint.is_split:
+            place = passed.index((k, 1.0))
+            passed[place : place + 2] = [(k, 0.5), passed[place + 1], (k, 0.5)]
+    return passed
 
 
 def _bands(joints: VirtualJoints, row: int) -> list[float]:
@@ -273,11 +267,11 @@ def _hinges(
         across = [item for item in joints.relaxations if item.in_tool_axes]
         turned = any(set(item.rows) not in _ROUND for item in across)
         if not (alone or turned):
-            return (_tilt(joints, *axes, alike=False) if axes else []), task
+            return (_tilt(joints, *axes) if axes else []), task
         return [_heading(), *_about(joints, axes)], Task.POSE
     if task is Task.POSITION and in_tool:
         # The band is in its path's axes, from which the tool may be rotated by any angle.
-        free = [VirtualJoint(f"tilt {k}", k % 2, True, 1.0 if k % 2 else 0.5) for k in range(3)]
+        free = [VirtualJoint(f"tilt {k}", k, True, 1.0, is_split=k == 0) for k in range(2)]
         return [_heading(), *free], Task.POSE
     return _about(joints, axes), task
 
@@ -287,10 +281,10 @@ def _about(joints: VirtualJoints, axes: list[int]) -> list[VirtualJoint]:
     if len(axes) < 2:
         return [_hinge(joints, axis) for axis in axes]
     if len(axes) == 2:
-        return _tilt(joints, *axes, alike=True)
+        return _tilt(joints, *axes, twists=False)
     last = _twisted(joints)
     first, second = (axis for axis in axes if axis != last)
-    return [_hinge(joints, last), *_tilt(joints, first, second, alike=True)]
+    return [_hinge(joints, last), *_tilt(joints, first, second, twists=False)]
 
 
 def _hinge(joints: VirtualJoints, axis: int) -> VirtualJoint:
@@ -300,19 +294,21 @@ def _hinge(joints: VirtualJoints, axis: int) -> VirtualJoint:
     return VirtualJoint(f"relaxed {ROW_NAMES[row]}", axis, True, scale, row, limit)
 
 
-def _tilt(joints: VirtualJoints, i: int, j: int, *, alike: bool) -> list[VirtualJoint]:
-    """Return the joints that tilt about two axes, without a twist where two turn `alike`."""
+def _tilt(joints: VirtualJoints, i: int, j: int, *, twists: bool = True) -> list[VirtualJoint]:
+    """Return the joints that tilt about two axes; the first is split where no twist may come in."""
     scale = min(_scale(joints, 3 + i), _scale(joints, 3 + j))
-    limits = [max(_bands(joints, 3 + axis)) / scale for axis in (i, j)]
-    if not alike:
-        return [
-            VirtualJoint(f"tilt {ROW_NAMES[3 + axis]}", axis, True, scale, 3 + axis, limit)
-            for axis, limit in zip((i, j), limits, strict=True)
-        ]
-    first = VirtualJoint(f"tilt {ROW_NAMES[3 + i]}", i, True, 0.5 * scale, 3 + i, limits[0])
-    middle = VirtualJoint(f"tilt {ROW_NAMES[3 + j]}", j, True, scale, 3 + j, limits[1])
-    last = VirtualJoint("tilt back", i, True, 0.5 * scale, None, limits[0])
-    return [first, middle, last]
+    return [
+        VirtualJoint(
+            f"tilt {ROW_NAMES[3 + axis]}",
+            axis,
+            True,
+            scale,
+            3 + axis,
+            max(_bands(joints, 3 + axis)) / scale,
+            is_split=axis == i and not twists,
+        )
+        for axis in (i, j)
+    ]
 
 
 def _twisted(joints: VirtualJoints) -> int:
@@ -377,11 +373,10 @@ def _tilted(
     first, second = joints.each[turning[0]], joints.each[turning[1]]
     i, j = first.axis, second.axis
     k = 3 - i - j
-    halves = len(turning) == 3
-    a, b = first.scale * s[:, turning[0]], second.scale * s[:, turning[1]]
-    if halves:
-        b = 0.5 * b
-    slope_a, slope_b = first.scale, second.scale * (0.5 if halves else 1.0)
+    halves = first.is_split
+    share = 0.5 if halves else 1.0
+    slope_a, slope_b = share * first.scale, share * second.scale
+    a, b = slope_a * s[:, turning[0]], slope_b * s[:, turning[1]]
     real, vector = np.cos(a) * np.cos(b), np.zeros((len(s), 3))
     vector[:, i], vector[:, j] = np.sin(a) * np.cos(b), np.sin(b)
     by_real, by_vector = np.zeros(s.shape), np.zeros((len(s), 3, s.shape[1]))

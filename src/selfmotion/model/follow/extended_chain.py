@@ -1,4 +1,4 @@
-"""Chains that are given by their tables alone: joints that no URDF has are on them."""
+"""The chain of an arm with virtual joints under it and behind its tool."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,38 +12,37 @@ from selfmotion.model.robot.tree_arrays import JOINT
 from selfmotion.model.task import SE3
 
 
-class TableChain(Chain):
-    """The joints of a table, from a base to a tip; see `Chain`.
+class ExtendedChain(Chain):
+    """An arm's chain with joints that no URDF has; see `Chain`.
 
     Parameters
     ----------
-    name : str
-        Of the tip.
+    chain : Chain
+        The arm's own.
     table : (c + 1, 6, 3)
-        See `ChainArrays.table`.
+        All joints, as in `ChainArrays.table`.
     dof : int
         Number of all coordinates, n.
     held : (n,) of bool, optional
         Coordinates that do not move the tip where motions are integrated; by default none.
     """
 
-    def __init__(self, name: str, table: Array, dof: int, held: Flags | None = None) -> None:
-        super().__init__(None, 0)
-        self._name, self._table, self._dof = name, table, dof
+    def __init__(self, chain: Chain, table: Array, dof: int, held: Flags | None = None) -> None:
+        super().__init__(chain.model, chain.tip, chain.base, chain.coupling)
+        self._chain, self._table, self._dof = chain, table, dof
         self._held = np.zeros(dof, dtype=np.bool_) if held is None else held
 
     def __getstate__(self) -> Any:
-        return self._name, self._table, self._dof, self._held
+        return self._chain, self._table, self._dof, self._held
+
+    def with_held(self, held: Flags) -> "ExtendedChain":
+        """Return the same with some coordinates held where motions are integrated, (n,)."""
+        return ExtendedChain(self._chain, self._table, self._dof, held)
 
     @property
     @override
     def dof(self) -> int:
         return self._dof
-
-    @property
-    @override
-    def tip_name(self) -> str:
-        return self._name
 
     @property
     @override
@@ -60,11 +59,11 @@ class TableChain(Chain):
         """Number of the coordinate of each joint of the chain."""
         return self._table[:-1, JOINT, 0].astype(np.int64)
 
+    @override
     def kinematics(self, data: Any = None) -> Kinematics:
-        """See `Chain.kinematics`: with `held` coordinates at rest."""
         table = self._table.copy()
         table[:-1, JOINT, 2] *= ~self._held[self._coordinates]
-        return TableKinematics(TableChain(self._name, table, self._dof), data)
+        return ExtendedKinematics(ExtendedChain(self._chain, table, self._dof), data)
 
     @override
     def place(self, q: Array) -> SE3:
@@ -77,12 +76,12 @@ class TableChain(Chain):
         return jacobians[0], rotations[0], translations[0]
 
 
-class TableKinematics(Kinematics):
-    """`Kinematics` of a table chain; its data are the configuration."""
+class ExtendedKinematics(Kinematics):
+    """`Kinematics` of an extended chain; its data are the configuration."""
 
     __slots__ = ("_at_tip", "_table")
 
-    def __init__(self, chain: TableChain, data: Any = None) -> None:
+    def __init__(self, chain: ExtendedChain, data: Any = None) -> None:
         n = chain.dof
         self.chain, self.data = chain, np.zeros(n) if data is None else data
         self.jacobian = np.zeros((6, n), order="F")
