@@ -33,7 +33,7 @@ quick: $(READY)
 # What plans, and what is computed with it: the rest reads and writes files and pages.
 PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
 	kernels margins motion nodes optimise paper path placement planning problem realtime result \
-	robot search task transfer)
+	robot rollout search task transfer)
 
 test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
 	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest --numprocesses 2 --dist loadfile \

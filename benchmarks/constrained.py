@@ -29,7 +29,8 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import inverse_metric
-from selfmotion.planning.paper import MinimumNormMotion, Objective, converged_minimum_norm
+from selfmotion.planning.paper import Objective
+from selfmotion.planning.rollout import MinimumNormMotion, converged_minimum_norm
 from selfmotion.problem.constraints import NO_OVERLAP, separate_clearances
 from selfmotion.problem.problem import problem_from_dict, problem_to_dict
 

@@ -10,7 +10,8 @@ import pinocchio as pin
 import selfmotion as sm
 from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper import Objective
+from selfmotion.planning.rollout import MinimumNormMotion
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:

@@ -19,7 +19,7 @@ def test_modules_of_packages_that_have_moved_say_where_they_are() -> None:
     for old, now in (
         ("problem.fit", "problem.problem.fit"),
         ("planning.steps", "planning.planner.steps"),
-        ("paper.rollout", "planning.paper.rollout"),
+        ("paper.ends", "planning.paper.ends"),
     ):
         with pytest.raises(ModuleNotFoundError, match=f"is selfmotion.{now} now$"):
             import_module(f"selfmotion.{old}")

@@ -14,8 +14,9 @@ from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.formulation.formulation import bound_conditions
-from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper import Objective
 from selfmotion.planning.paper.objective import node_tangents
+from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of

@@ -11,7 +11,7 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.task import Task
-from selfmotion.planning.paper import Rollout
+from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.constraints import (
     BoundConstraint,
     BoundLimits,

@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import ClosedMotion, EndState
 from selfmotion.model.task import SE3
-from selfmotion.planning.paper.minimum_norm import FreeStart
+from selfmotion.planning.rollout import FreeStart
 from support.arms import PANDA_HOME, short_line, start_of
 from support.followed import standing
 

@@ -12,15 +12,9 @@ from selfmotion.model.motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.optimise import inverse_metric
-from selfmotion.planning.paper import (
-    Eliminated,
-    FreeStart,
-    Solution,
-    closed,
-    converged_minimum_norm,
-    solve,
-)
+from selfmotion.planning.paper import Eliminated, Solution, closed, solve
 from selfmotion.planning.paper.objective import residual_tangents, residuals, unmet
+from selfmotion.planning.rollout import FreeStart, converged_minimum_norm
 from support.arms import PANDA_HOME, central_difference, robot_named
 
 # Exact gradients against extrapolated differences, relative to the largest entry.

@@ -11,9 +11,8 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.motion.grid import Grid
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper import MinimumNormMotion, Objective
-from selfmotion.planning.paper.minimum_norm import FixedStart
-from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.paper import Objective
+from selfmotion.planning.rollout import FixedStart, MinimumNormMotion, Rollout
 from support.arms import (
     PANDA_HOME,
     Case,

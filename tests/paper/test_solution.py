@@ -13,7 +13,8 @@ from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, Polynom
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.formulation.formulation import bound_conditions
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
-from selfmotion.planning.paper import MinimumNormMotion, Solution, converged_minimum_norm, solve
+from selfmotion.planning.paper import Solution, solve
+from selfmotion.planning.rollout import MinimumNormMotion, converged_minimum_norm
 from selfmotion.problem.constraints import BoundEnd
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 

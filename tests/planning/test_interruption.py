@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.planning.paper import Rollout
+from selfmotion.planning.rollout import Rollout
 from support.arms import PANDA_HOME
 
 # All stages of a plan from a free start, compared with the global search.

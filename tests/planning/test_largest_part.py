@@ -13,11 +13,11 @@ from selfmotion.basics import Counts
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion.grid import Grid
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper import Rollout, converged_minimum_norm
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.largest_part import Part, shorter_part
 from selfmotion.planning.planner.solution import Solution
+from selfmotion.planning.rollout import Rollout, converged_minimum_norm
 from selfmotion.shell.replay import write_replay
 from support.arms import PANDA_HOME, robot_named
 

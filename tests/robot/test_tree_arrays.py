@@ -15,7 +15,7 @@ from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.robot import Dynamics, Energy, ToolRates
 from selfmotion.model.robot.tree_arrays import JOINT
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper.minimum_norm import FixedStart
+from selfmotion.planning.rollout import FixedStart
 from support.arms import Case, central_difference, objective_of, short_line
 from support.files_of_people import finger, torso
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step

@@ -8,7 +8,8 @@ import pinocchio as pin
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import NullMotionTable
-from selfmotion.planning.paper import Objective, Rollout, Start
+from selfmotion.planning.paper import Objective
+from selfmotion.planning.rollout import Rollout, Start
 
 # Arms with a task each, chosen so that every task and redundancy from 1 to 5 occurs.
 CASES = [

@@ -9,7 +9,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.paper import converged_minimum_norm
+from selfmotion.planning.rollout import converged_minimum_norm
 from support.arms import Case
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Grid, NullMotionTable
-from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.rollout import Rollout
 from support.arms import Case
 
 

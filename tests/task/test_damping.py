@@ -13,8 +13,7 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.task.damping import DampingLaw
-from selfmotion.planning.paper.minimum_norm import FixedStart
-from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.rollout import FixedStart, Rollout
 from selfmotion.problem.costs import OffPath
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities

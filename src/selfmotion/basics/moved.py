@@ -30,7 +30,10 @@ MOVED = {
 MOVED_MODULES = {
     "model.follow.augmented": "model.follow.relaxed",
     "planning.nodes.samples": "planning.formulation.sampled",
-    "planning.paper.still": "planning.paper.minimum_norm",
+    "paper.rollout": "planning.rollout.rollout",
+    "planning.paper.minimum_norm": "planning.rollout.minimum_norm",
+    "planning.paper.rollout": "planning.rollout.rollout",
+    "planning.paper.still": "planning.rollout.minimum_norm",
     "planning.planner.candidate": "planning.planner.guess",
     "planning.planner.polish": "planning.planner.local_search",
     "planning.planner.solutions": "planning.planner.outcomes",

@@ -12,7 +12,7 @@ from selfmotion.model.motion import Grid, NullMotion
 from selfmotion.model.path import PathSamples
 from selfmotion.model.robot import null_space
 from selfmotion.planning.optimise import minimize_quadratic
-from selfmotion.planning.paper import Rollout
+from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION

@@ -17,9 +17,10 @@ from selfmotion.paper.study.published import (
 )
 from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
-from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper import Objective
 from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
+from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity
 from selfmotion.problem.problem import Problem, sample_problem
 

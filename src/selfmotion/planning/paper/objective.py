@@ -1,6 +1,7 @@
 """From the decision vector to the cost and its gradient: the only place with the chain rule."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,14 +12,14 @@ from selfmotion.planning.formulation import (
     require_finite,
     require_finite_values,
 )
-from selfmotion.planning.paper.minimum_norm import (
+from selfmotion.planning.rollout import (
     FixedStart,
     FreeStart,
     MinimumNormMotion,
+    Rollout,
     Start,
-    null_motion_table,
+    brought_to_rest,
 )
-from selfmotion.planning.paper.rollout import Rollout
 from selfmotion.problem.constraints import BoundConstraint, NodeTangents, linearised, violated
 from selfmotion.problem.costs import ERROR, Cost, Samples
 
@@ -212,7 +213,7 @@ class Objective:
         )
         found = cls(
             rollout or Rollout(follows, grid, damping=formulation.problem.damping_law),
-            null_motion_table(
+            _null_motion_table(
                 formulation, t, minimum_norm, null_motion or formulation.problem.null_motion, around
             ),
             formulation.costs,
@@ -419,3 +420,29 @@ def _sensitivities(objective: Objective, x: Array) -> tuple[Array, Array]:
     start_matrix[:, :first] = objective.start.tangent()
     objective._tangents = objective.rollout.sensitivities(epsilon_matrix, start_matrix)
     return objective._tangents
+
+
+def _null_motion_table(
+    formulation: Formulation,
+    t: Array,
+    minimum_norm: MinimumNormMotion,
+    motion: NullMotion,
+    around: Array | None,
+) -> NullMotionTable:
+    """Return a null motion at times t (S,), in the basis of a motion at x = 0.
+
+    Around (S, n) is the null motion of x = 0, by default the guide's.
+    """
+    n = formulation.follows.dof
+    redundancy = n - formulation.follows.dimension
+    if around is None:
+        guide = minimum_norm.guide
+        around = (
+            np.zeros((len(t), n)) if guide is None else brought_to_rest(formulation, t, guide(t))
+        )
+    # Of an arm without redundancy no null motion acts.
+    is_joint = motion.space == "joint" and redundancy > 0
+    frame, rows = (None, n) if is_joint else (partial(minimum_norm.frame, t), redundancy)
+    orders = formulation.problem.rest_orders
+    functions = motion.resting(t, formulation.path.duration, orders)
+    return NullMotionTable(functions, frame, rows, around)

@@ -28,8 +28,8 @@ from selfmotion.planning.optimise import (
     Status,
 )
 from selfmotion.planning.paper.ends import Eliminated, closed
-from selfmotion.planning.paper.minimum_norm import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.planning.paper.objective import Objective, require_finite_at, unmet
+from selfmotion.planning.rollout import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.problem.constraints import BoundConstraint
 
 # Relative agreement of the cost on a grid and on the halved one.

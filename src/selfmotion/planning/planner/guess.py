@@ -9,11 +9,11 @@ from selfmotion.model.follow import is_plain
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.formulation import BoundConditions, Formulation, with_windows_shut
-from selfmotion.planning.paper import Guide, MinimumNormMotion, converged_minimum_norm
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, most_nodes
 from selfmotion.planning.planner.outcomes import MinimumNormOutcome
 from selfmotion.planning.result import Plan
+from selfmotion.planning.rollout import Guide, MinimumNormMotion, converged_minimum_norm
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 

@@ -9,11 +9,11 @@ from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.model.motion import Evaluation, Trajectory
 from selfmotion.planning.formulation import Formulation, certified, path_errors
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.paper import MOST_HALVINGS
 from selfmotion.planning.planner.largest_part import Part
 from selfmotion.planning.planner.refinement import refined
 from selfmotion.planning.planner.solution import Solution, have_one_start
 from selfmotion.planning.planner.solve import kept_off_itself, settle, solve_again
+from selfmotion.planning.rollout import MOST_HALVINGS
 
 # Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
 _RESOLVED = 0.3

@@ -10,12 +10,12 @@ from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
 from selfmotion.planning.formulation import Formulation, keeps_off_itself, with_windows_shut
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.paper import Guide, MinimumNormMotion
 from selfmotion.planning.planner.effort import Effort, Search
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.screening import ROUGH_MOTIONS
 from selfmotion.planning.planner.solution import Solution
 from selfmotion.planning.planner.solve import solve
+from selfmotion.planning.rollout import Guide, MinimumNormMotion
 from selfmotion.planning.search import Reach
 from selfmotion.problem.problem import along_other_paths
 

@@ -30,8 +30,8 @@ from selfmotion.planning.nodes import (
     quickness_of,
 )
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.paper import MinimumNormMotion
 from selfmotion.planning.planner.grids import UNKEPT
+from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.planning.search import BESIDE
 from selfmotion.problem.constraints import (
     ActiveConstraint,

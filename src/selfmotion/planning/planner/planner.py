@@ -10,7 +10,6 @@ from selfmotion.basics import Array, BreakdownError, SelfmotionError
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.paper import Guide
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.judging import Judged
@@ -19,6 +18,7 @@ from selfmotion.planning.planner.setup import Setup
 from selfmotion.planning.planner.solution import Solution
 from selfmotion.planning.planner.solve import solve_again
 from selfmotion.planning.result import Attempt
+from selfmotion.planning.rollout import Guide
 from selfmotion.planning.search import Obstruction, Reach, Sequence, reachable
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from selfmotion.basics import Flags
 from selfmotion.model.motion import Evaluation
 from selfmotion.planning.optimise import Iteration, Status
-from selfmotion.planning.paper import MOST_HALVINGS
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.outcomes import (
     MinimumNormOutcome,
@@ -13,6 +12,7 @@ from selfmotion.planning.planner.outcomes import (
     Outcome,
     PublishedOutcome,
 )
+from selfmotion.planning.rollout import MOST_HALVINGS
 
 
 @dataclass(frozen=True, eq=False)

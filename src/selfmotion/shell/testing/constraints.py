@@ -19,7 +19,8 @@ from selfmotion.certificate import (
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.formulation import bound_conditions, on_path
-from selfmotion.planning.paper import MinimumNormMotion, Objective, node_tangents
+from selfmotion.planning.paper import Objective, node_tangents
+from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.planning.search import start_candidates
 from selfmotion.problem.constraints import BoundConstraint, Constraint, linearised
 from selfmotion.problem.problem import Problem

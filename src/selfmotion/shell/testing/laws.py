@@ -14,7 +14,8 @@ from selfmotion.model.robot import RobotModel, load_robot
 from selfmotion.model.task import Task, exp3, log3
 from selfmotion.planning.formulation import on_path
 from selfmotion.planning.optimise import Iteration, Minimum, Optimizer
-from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper import Objective
+from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.problem.problem import Problem
 

@@ -5,7 +5,7 @@ import pytest
 
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
-from selfmotion.planning.paper.minimum_norm import FreeStart
+from selfmotion.planning.rollout import FreeStart
 from support.arms import robot_named, short_line, start_of
 from support.two_arms import both_arms
 

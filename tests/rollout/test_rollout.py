@@ -9,8 +9,7 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable
 from selfmotion.model.motion.grid import Grid
-from selfmotion.planning.paper.minimum_norm import FixedStart
-from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.rollout import FixedStart, Rollout
 from support.arms import Case, central_difference, objective_of, robot_named, short_line, start_of
 from support.rollouts import random_epsilon, rollout_of
 
