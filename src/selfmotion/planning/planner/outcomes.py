@@ -1,15 +1,13 @@
-"""Motions that are found: the minimum-norm one, the published method's, and those on nodes."""
+"""Motions that are found: the minimum-norm motion, and those on nodes."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from selfmotion.basics import Array, BreakdownError, Counts, Flags
+from selfmotion.basics import Array, Counts, Flags
 from selfmotion.model.motion import Evaluation, Grid, NodeNullMotion, NullMotion, Trajectory
-from selfmotion.planning import paper
 from selfmotion.planning.formulation import (
     BoundConditions,
     Formulation,
@@ -35,14 +33,12 @@ from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.planning.search import BESIDE
 from selfmotion.problem.constraints import (
     ActiveConstraint,
-    BoundConstraint,
     Multipliers,
     active_of,
     penalised,
     violated,
     worst_time,
 )
-from selfmotion.problem.costs import Samples
 
 # Residual of conditions at the ends [rad, rad/s].
 ENDS_MET = 1e-8
@@ -73,6 +69,62 @@ class OutcomeFacts(NamedTuple):
     coefficients: Array
     active: tuple[ActiveConstraint, ...] = ()
     remaining: float | None = None
+
+
+class Outcome(Protocol):
+    """A motion, however it was found."""
+
+    @property
+    def status(self) -> Status:
+        """How the minimisation ended that found it."""
+        ...
+
+    @property
+    def steps(self) -> int:
+        """Intervals of its grid."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """F; inf where it is not finite."""
+        ...
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """Violations, one for each constraint."""
+        ...
+
+    @property
+    def keeps_off_itself(self) -> bool:
+        """Whether the default clearance from itself holds, at the nodes and by meshes."""
+        ...
+
+    @property
+    def breaks_at(self) -> float | None:
+        """Time [s] of the largest violation; None where none is known."""
+        ...
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """The motion with its costs."""
+        ...
+
+    @property
+    def minimum_norm_evaluation(self) -> Evaluation | None:
+        """The minimum-norm motion on the same grid; None where that is on nodes."""
+        ...
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+        ...
+
+    def facts(self) -> OutcomeFacts:
+        """Return what a report says of it."""
+        ...
+
+    def refined(self, where: Flags | None = None) -> Self:
+        """Return it with half the step length, for all or some of the steps (N,)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +211,12 @@ class MinimumNormOutcome:
         trajectory = Trajectory(t, q, qd, self.formulation.coordinates.names, qdd)
         return Evaluation(np.zeros(0), self.terms, trajectory, rollout.damped)
 
-    def refined(self, where: Flags | None = None) -> "MinimumNormOutcome":
+    @property
+    def minimum_norm_evaluation(self) -> Evaluation:
+        """The motion itself."""
+        return self.evaluation
+
+    def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, for all or some of the steps (N,).
 
         As it is where it breaks down on that grid.
@@ -169,53 +226,6 @@ class MinimumNormOutcome:
         finer = MinimumNormMotion.on(own.formulation, own.start, grid, own.guide)
         self.counts.jacobians += finer.jacobian_evaluations
         return self if finer.broken is not None else replace(self, motion=finer)
-
-
-@dataclass(frozen=True, eq=False)
-class PublishedOutcome(paper.Solution):
-    """A motion of the published method, optimised.
-
-    Attributes
-    ----------
-    conditions : BoundConditions
-        Judged, not required.
-    """
-
-    conditions: BoundConditions = field(default_factory=BoundConditions)
-    breaks_at: ClassVar[float | None] = None
-
-    @property
-    def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
-        motion = sampled(self.method.formulation, self.objective.samples(self.x))
-        return motion.with_conditions(self.conditions.every)
-
-    @cached_property
-    def violations(self) -> tuple[str, ...]:
-        """Violations, one for each constraint."""
-        return violated(self._evaluated)
-
-    @cached_property
-    def keeps_off_itself(self) -> bool:
-        """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return keeps_off_itself(self.method.formulation, self.nodes)
-
-    def merit(self) -> float:
-        """Return the cost, much larger where constraints are violated: for ranking."""
-        return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
-
-    def facts(self) -> OutcomeFacts:
-        """Return what a report says of it: constraints are judged, not required."""
-        return OutcomeFacts(self.method.formulation.problem.null_motion, self.coefficients)
-
-    def refined(self, where: Flags | None = None) -> Self:
-        """Return it with half the step length, for all or some of the steps (N,).
-
-        As it is where it breaks down on that grid.
-        """
-        try:
-            return super().refined(where)
-        except BreakdownError:
-            return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +252,7 @@ class NodeOutcome:
     remaining: float | None = None
     optimum: Optimum | None = None
     is_chain: bool = False
+    minimum_norm_evaluation: ClassVar[Evaluation | None] = None
 
     @classmethod
     def of(cls, optimum: Optimum, status: Status) -> "NodeOutcome":
@@ -316,7 +327,7 @@ class NodeOutcome:
         forget(motion)
         return found
 
-    def on(self, t: Array) -> "NodeOutcome | None":
+    def on(self, t: Array) -> Self | None:
         """Return it on other nodes (N + 1,); None if one of them is out of reach.
 
         Beside a singular pose the path may be so, by next to nothing: a little later it is not.
@@ -334,7 +345,7 @@ class NodeOutcome:
                 return replace(self, motion=motion, multipliers=multipliers)
         return None
 
-    def refined(self, where: Flags | None = None) -> "NodeOutcome":
+    def refined(self, where: Flags | None = None) -> Self:
         """Return it with all intervals halved, or some (N,); unchanged where that fails."""
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
@@ -347,10 +358,6 @@ def on_the_way(motion: NodeMotion, status: Status = Status.STOPPED) -> NodeOutco
 def _coefficients(motion: NodeMotion) -> Array:
     """Return the null motion at the nodes, joint by joint."""
     return np.asarray(null_motion_of(motion).T.ravel())
-
-
-Outcome = MinimumNormOutcome | PublishedOutcome | NodeOutcome
-"""A motion, however it was found."""
 
 
 def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:

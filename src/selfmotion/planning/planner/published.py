@@ -1,10 +1,13 @@
 """The published method from an initial guess; the only place where the planner calls it."""
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, BreakdownError, Flags
 from selfmotion.model.motion import (
     FreeNullMotion,
     NullMotionTable,
@@ -12,12 +15,66 @@ from selfmotion.model.motion import (
     Trajectory,
 )
 from selfmotion.model.robot import null_space
-from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.formulation import (
+    BoundConditions,
+    Formulation,
+    keeps_off_itself,
+    sampled,
+)
 from selfmotion.planning.optimise import Optimizer, Status
-from selfmotion.planning.paper import Method, Objective
+from selfmotion.planning.paper import Method, Objective, Solution as Optimum
 from selfmotion.planning.planner.guess import Guess, pace_of
-from selfmotion.planning.planner.outcomes import PublishedOutcome
+from selfmotion.planning.planner.outcomes import OutcomeFacts
 from selfmotion.planning.planner.solution import Solution
+from selfmotion.problem.constraints import BoundConstraint, penalised, violated
+from selfmotion.problem.costs import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedOutcome(Optimum):
+    """A motion of the published method, optimised.
+
+    Attributes
+    ----------
+    conditions : BoundConditions
+        Judged, not required.
+    """
+
+    conditions: BoundConditions = field(default_factory=BoundConditions)
+    breaks_at: ClassVar[float | None] = None
+
+    @property
+    def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
+        motion = sampled(self.method.formulation, self.objective.samples(self.x))
+        return motion.with_conditions(self.conditions.every)
+
+    @cached_property
+    def violations(self) -> tuple[str, ...]:
+        """Violations, one for each constraint."""
+        return violated(self._evaluated)
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """Whether the default clearance from itself holds, at the nodes and by meshes."""
+        return keeps_off_itself(self.method.formulation, self.nodes)
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+        return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
+
+    def facts(self) -> OutcomeFacts:
+        """Return what a report says of it: constraints are judged, not required."""
+        return OutcomeFacts(self.method.formulation.problem.null_motion, self.coefficients)
+
+    def refined(self, where: Flags | None = None) -> Self:
+        """Return it with half the step length, for all or some of the steps (N,).
+
+        As it is where it breaks down on that grid.
+        """
+        try:
+            return super().refined(where)
+        except BreakdownError:
+            return self
 
 
 def solve_as_published(solution: Solution, optimizer: Optimizer) -> Solution:

@@ -6,12 +6,7 @@ from selfmotion.basics import Flags
 from selfmotion.model.motion import Evaluation
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.planner.guess import Guess
-from selfmotion.planning.planner.outcomes import (
-    MinimumNormOutcome,
-    NodeOutcome,
-    Outcome,
-    PublishedOutcome,
-)
+from selfmotion.planning.planner.outcomes import NodeOutcome, Outcome
 from selfmotion.planning.rollout import MOST_HALVINGS
 
 
@@ -41,6 +36,11 @@ class Solution:
     def of(cls, guess: Guess) -> "Solution":
         """Return the minimum-norm motion of a guess, before anything is found."""
         return cls(guess, guess.minimum_norm)
+
+    @property
+    def on_nodes(self) -> NodeOutcome | None:
+        """The motion if it is one on nodes; None before one is found, and of others."""
+        return self.outcome if isinstance(self.outcome, NodeOutcome) else None
 
     @property
     def status(self) -> Status:
@@ -84,12 +84,7 @@ class Solution:
     @property
     def minimum_norm_evaluation(self) -> Evaluation:
         """The minimum-norm motion, on the grid of this one where that has one."""
-        found = self.outcome
-        if isinstance(found, PublishedOutcome):
-            return found.minimum_norm_evaluation
-        if isinstance(found, MinimumNormOutcome):
-            return found.evaluation
-        return self.guess.minimum_norm.evaluation
+        return self.outcome.minimum_norm_evaluation or self.guess.minimum_norm.evaluation
 
     def score(self) -> tuple[bool, bool, float]:
         """Return the sort key of motions, the smaller, the better.
@@ -114,4 +109,4 @@ def have_one_start(one: Solution, other: Solution) -> bool:
 
 def is_chain(solution: Solution) -> bool:
     """Whether a motion is a chain of the search, which is at its optimum."""
-    return isinstance(solution.outcome, NodeOutcome) and solution.outcome.is_chain
+    return solution.on_nodes is not None and solution.on_nodes.is_chain

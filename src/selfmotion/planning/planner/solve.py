@@ -49,19 +49,19 @@ def solve_again(solution: Solution, cost_to_beat: float = np.inf) -> Solution:
         return solve_as_published(solution, guess.effort.optimizer)
     if not is_on_nodes(guess.formulation, guess.effort):
         return solution
-    before = solution.outcome
+    before = solution.on_nodes
 
     def optimum(search: LocalSearch) -> NodeOutcome | None:
-        if isinstance(before, NodeOutcome):
+        if before is not None:
             return search.again(before)
         return search.near(*guess.first_motions(), cost_to_beat)
 
     found = _searched(solution, optimum)
-    outcome = found.outcome
+    nodes = found.on_nodes
     # One that costs more already is none to take either way.
-    is_cheaper = isinstance(outcome, NodeOutcome) and outcome.cost < cost_to_beat
+    is_cheaper = nodes is not None and nodes.cost < cost_to_beat
     try:
-        if is_cheaper and not outcome.keeps_off_itself:
+        if is_cheaper and not found.outcome.keeps_off_itself:
             found = kept_off_itself(found) or found
     except KeyboardInterrupt:
         # There is a motion by now.
@@ -77,8 +77,8 @@ def settle(solution: Solution) -> Solution:
 
     The published method has done so on its grids.
     """
-    outcome = solution.outcome
-    if solution.ended is not None or not isinstance(outcome, NodeOutcome) or outcome.is_chain:
+    outcome = solution.on_nodes
+    if solution.ended is not None or outcome is None or outcome.is_chain:
         return solution
     return _searched(solution, lambda search: settled(search, outcome))
 
@@ -88,8 +88,8 @@ def kept_off_itself(solution: Solution) -> Solution | None:
 
     Few do, so that the others need not wait for distances. None where there is no other one.
     """
-    guess, outcome = solution.guess, solution.outcome
-    if not isinstance(outcome, NodeOutcome) or outcome.violations or outcome.is_chain:
+    guess, outcome = solution.guess, solution.on_nodes
+    if outcome is None or outcome.violations or outcome.is_chain:
         return None
     # Of a given start in which it meets itself, nothing else begins.
     can = guess.free or keeps_off_itself(guess.formulation, outcome.motion.place.q[:1])
@@ -121,12 +121,12 @@ def at_warm_start(guess: Guess) -> Solution | None:
 def _searched(solution: Solution, find: _Search) -> Solution:
     """Return the solution with what a search finds, if it finds something."""
     search = LocalSearch.of(solution.guess)
-    before, ended = solution.outcome, solution.ended
+    ended = solution.ended
     try:
         found = find(search)
     except KeyboardInterrupt:
         found = search.recorder.latest
-        if found is None and not isinstance(before, NodeOutcome):
+        if found is None and solution.on_nodes is None:
             raise
         ended = Status.INTERRUPTED
     if search.recorder.ended is Status.STOPPED:
@@ -136,7 +136,7 @@ def _searched(solution: Solution, find: _Search) -> Solution:
             found = search.recorder.latest or found
     return replace(
         solution,
-        outcome=found or before,
+        outcome=found or solution.outcome,
         history=(*solution.history, *search.recorder.history),
         ended=ended,
         is_hopeless=search.is_hopeless,
