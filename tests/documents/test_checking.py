@@ -109,6 +109,13 @@ def test_a_tilt_in_degrees_is_the_one_in_radians(tmp_path: Path) -> None:
         assert problem.constraints[-1].within == pytest.approx(np.radians(170.0), rel=1e-15)
 
 
+def test_no_clearance_is_said_by_false_and_not_by_an_empty_list(tmp_path: Path) -> None:
+    plain = CELL[: CELL.index("[clearance]")]
+    assert sm.read_problem(written(tmp_path, f"clearance = false\n{plain}")).clearance is None
+    with pytest.raises(sm.errors.FileFormatError, match="clearance: is an empty list"):
+        sm.read_problem(written(tmp_path, f"clearance = []\n{plain}"))
+
+
 @pytest.mark.parametrize(
     ("more", "given", "value"),
     [

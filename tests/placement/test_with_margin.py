@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.work.margins import Shortfall, Shortfalls
 from selfmotion.work.placement import with_margin
 from support.arms import robot_named
 from support.displaced import MISSED, Judge, random_displacement
@@ -101,6 +102,18 @@ def test_bands_give_what_a_displacement_uses(problem: sm.Problem) -> None:
         with_margin._narrowed(asked, sm.Margin(0.05, 0.02), 0.5)
     turned = dataclasses.replace(asked, relaxations=(sm.Relaxation("rz", 0.1),))
     assert with_margin._narrowed(turned, sm.Margin(0.01, 0.02), 0.5)[0].band == pytest.approx(0.08)
+
+
+def test_a_pair_that_two_displacements_lack_is_raised_once() -> None:
+    """By the displacement that lacks more, in whatever order they come."""
+    pair = ("clamp", "hand")
+    part, base = (
+        Shortfall(of, pair, 1.0, scale, 0.01) for of, scale in (("part", 0.4), ("base", 0.7))
+    )
+    for known in ({}, {pair: 0.012}):
+        alone = with_margin._adjusted(known, Shortfalls((part,), 0.5), 0.0)
+        for both in ((part, base), (base, part)):
+            assert with_margin._adjusted(known, Shortfalls(both, 0.5), 0.0) == alone
 
 
 def test_what_cannot_be_bought_is_refused(problem: sm.Problem) -> None:

@@ -42,13 +42,17 @@ def checked(
             # Without damping there is none by default; self-collision is looked at.
             if on == (name == "damping"):
                 switched[name] = {} if on else None
-    several = raw.pop("clearance") if isinstance(raw.get("clearance"), list) else []
+    several = raw.pop("clearance") if isinstance(raw.get("clearance"), list) else None
+    if several == []:
+        raise FileFormatError(
+            "clearance: is an empty list, expected one or more tables; give false for none"
+        )
     try:
         found = document_model().model_validate(raw)
     except ValidationError as error:
         raise FileFormatError(_message(error, raw, written)) from error
     table = {**_given(found), **switched}
-    if several:
+    if several is not None:
         each = enumerate(several)
         table["clearance"] = [_checked_clearance(item, f"clearance[{k}]") for k, item in each]
     table["path"] = _inner(table["path"], "path")

@@ -283,13 +283,17 @@ def _adjusted(
     """
     spare = max(found.least - 1.0, 0.0)
     adjusted = {pair: far - spare * (far - clearance) for pair, far in clearances.items()}
+    raised: dict[tuple[str, str], float] = {}
     for item in found.items:
         pair = (min(item.pair), max(item.pair))
-        if pair in adjusted:
-            adjusted[pair] += (1.0 - item.scale) * item.used + _MORE
-        else:
-            adjusted[pair] = clearance + (1.0 + _SHARE) * item.used
-    return adjusted
+        far = (
+            adjusted[pair] + (1.0 - item.scale) * item.used + _MORE
+            if pair in adjusted
+            else clearance + (1.0 + _SHARE) * item.used
+        )
+        # Several clearances may have a pair: it is raised once, by the one that lacks most.
+        raised[pair] = max(far, raised.get(pair, far))
+    return {**adjusted, **raised}
 
 
 def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
