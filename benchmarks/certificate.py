@@ -22,8 +22,9 @@ from rich.console import Console
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from selfmotion.certificate.path_error import deviation_from, smallest_singular_values
-from selfmotion.model.follow.follow import only_tip
+from selfmotion.certificate import deviation_from
+from selfmotion.certificate.path_error import smallest_singular_values
+from selfmotion.model.follow import only_tip
 from support.scenes import Scene, among_plates, carrying, near_limits, seams
 
 REPEATS = 9

@@ -20,8 +20,7 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion.basics import one_blas_thread
 from selfmotion.model.motion import Trajectory
-from selfmotion.planning.result.pace_rows import PaceLimits
-from selfmotion.planning.result.pacing import Ends, along, fastest_pace
+from selfmotion.planning.result import Ends, PaceLimits, along, fastest_pace
 
 # Intervals of the grids without limits of the jerk and with them.
 GRID, GRID_OF_JERKS = 3000, 1000

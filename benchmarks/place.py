@@ -19,7 +19,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 import selfmotion as sm
-from selfmotion.work.placement.places import Places, Tried, places_of
+from selfmotion.work.placement import Tried
+from selfmotion.work.placement.places import Places, places_of
 from selfmotion.work.placement.search import Box, Descent, beginnings
 
 ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "position"))

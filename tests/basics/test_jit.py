@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 SOURCE = """
-from selfmotion.basics.jit import kernel
+from selfmotion.basics import kernel
 
 @kernel
 def twice(x):

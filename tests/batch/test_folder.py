@@ -3,7 +3,8 @@
 import csv
 from pathlib import Path
 
-from selfmotion.work.batch.folder import Folder, Row
+from selfmotion.work.batch import Row
+from selfmotion.work.batch.folder import Folder
 
 
 def test_what_ends_early_has_no_cost_to_compare(tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
+from selfmotion.work.batch import Row
 from selfmotion.work.batch.folder import Folder, answers
-from selfmotion.work.batch.items import Row, problem_items
+from selfmotion.work.batch.items import problem_items
 from support.arms import robot_named
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from selfmotion.work.batch import Row, labels
-from selfmotion.work.batch.maps import maps
+from selfmotion.work.batch import Row, labels, maps
 
 X, Y, YAW = "workpiece.frame.position.0", "workpiece.frame.position.1", "workpiece.frame.rpy_deg.2"
 NS = "{http://www.w3.org/2000/svg}"

@@ -5,8 +5,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, series
-from selfmotion.certificate import MotionSegments
-from selfmotion.certificate.bounding import BoundedFunction, bounded
+from selfmotion.certificate import BoundedFunction, MotionSegments
+from selfmotion.certificate.bounding import bounded
 from support.arms import robot_named
 from support.motions import motion_of
 

@@ -7,10 +7,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate import MotionSegments
-from selfmotion.certificate.bounding import BoundedFunction, _measured
+from selfmotion.certificate import BoundedFunction, MotionSegments, Shares
+from selfmotion.certificate.bounding import _measured
 from selfmotion.certificate.path_error import _PathErrors
-from selfmotion.certificate.quantity import Shares
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.shell.testing.constraints import check_majorants
 from support.arms import robot_named

@@ -10,22 +10,20 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.certificate import deviation_from
 from selfmotion.certificate.path_error import (
     _FROBENIUS,
     PathCheck,
     _vector_series,
     bound_errors,
-    deviation_from,
     deviation_size,
     excess,
     jacobians,
     poses,
     rotation_vectors,
 )
-from selfmotion.model.follow import Follows
-from selfmotion.model.follow.follow import only_tip
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import path_errors
+from selfmotion.model.follow import Follows, only_tip
+from selfmotion.planning.formulation import Formulation, path_errors
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 

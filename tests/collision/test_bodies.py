@@ -8,18 +8,19 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from selfmotion.basics.errors import CollisionError, RobotError
+from selfmotion.basics import CollisionError, RobotError
 from selfmotion.model.collision import (
+    Body,
     Box,
     Capsule,
     ClearanceModel,
     CollisionModel,
     Cylinder,
     Mesh,
+    Solid,
     Sphere,
+    link_bodies,
 )
-from selfmotion.model.collision.bodies import Body, link_bodies
-from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from support.independent_distances import mesh_of
 from support.two_arms import baxter_with_both_arms

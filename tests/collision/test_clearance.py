@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from selfmotion.basics.errors import RobotError
+from selfmotion.basics import RobotError
 from selfmotion.model.collision import (
     Box,
     Capsule,

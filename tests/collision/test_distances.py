@@ -7,11 +7,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.basics.errors import CollisionError
-from selfmotion.model.collision import distances as module
+from selfmotion.basics import CollisionError
+from selfmotion.model.collision import Solid, distances as module
 from selfmotion.model.collision.distances import HullDistances
 from selfmotion.model.collision.pair_distances import MeshDistances
-from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import RobotModel
 from support.independent_distances import (
     KINDS,

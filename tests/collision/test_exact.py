@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from selfmotion.basics.errors import CollisionError, RobotError
+from selfmotion.basics import CollisionError, RobotError
 from selfmotion.model.collision import (
     Box,
     Capsule,

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.basics.errors import CollisionError
+from selfmotion.basics import CollisionError
 from selfmotion.model.collision import (
     Box,
     Capsule,

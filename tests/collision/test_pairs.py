@@ -9,10 +9,15 @@ import pinocchio as pin
 import pytest
 
 from selfmotion.constraints import Clearance
-from selfmotion.model.collision import CollisionModel, disabled_links, how_near
-from selfmotion.model.collision.bodies import Body, link_bodies
+from selfmotion.model.collision import (
+    Body,
+    CollisionModel,
+    Solid,
+    disabled_links,
+    how_near,
+    link_bodies,
+)
 from selfmotion.model.collision.pairs import candidate_pairs
-from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import RobotModel, load_robot
 
 

@@ -10,12 +10,9 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import EndState, JointLimits
-from selfmotion.model.motion.grid import Grid
-from selfmotion.model.motion.null_motion import PolynomialNullMotion
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import bound_conditions
-from selfmotion.planning.paper import Objective
-from selfmotion.planning.paper.objective import node_tangents
+from selfmotion.model.motion import Grid, PolynomialNullMotion
+from selfmotion.planning.formulation import Formulation, bound_conditions
+from selfmotion.planning.paper import Objective, node_tangents
 from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show

@@ -9,7 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, ProblemError
 from selfmotion.model.follow import Follows
-from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion import Grid
 from selfmotion.model.task import Task
 from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.constraints import (

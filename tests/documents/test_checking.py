@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import read_document
-from selfmotion.basics.tables import ANGLES, LENGTHS, in_si
+from selfmotion.basics import ANGLES, LENGTHS, in_si, read_document
 from selfmotion.model.robot import Coordinate
 from selfmotion.shell.documents import job_of
 from selfmotion.shell.documents.schema import json_schema

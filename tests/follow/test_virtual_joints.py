@@ -9,17 +9,21 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.certificate.path_error import deviation_from
-from selfmotion.model.follow import Follows, with_tolerances
-from selfmotion.model.follow.relaxed import band_limits, deviation_of, has_windows, window_edges
+from selfmotion.certificate import deviation_from
+from selfmotion.model.follow import (
+    Follows,
+    band_limits,
+    deviation_of,
+    has_windows,
+    window_edges,
+    with_tolerances,
+)
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import (
     BoundConditions,
     CurveSamples,
     Formulation,
     SampledMotion,
-)
-from selfmotion.planning.formulation.formulation import (
     on_path,
     sampled,
     sampled_along,

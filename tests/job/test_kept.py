@@ -10,9 +10,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.work.job import Step
+from selfmotion.work.job import Step, backwards
 from selfmotion.work.job.files import ResultCache
-from selfmotion.work.job.seam import backwards, backwards_plan
+from selfmotion.work.job.seam import backwards_plan
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])

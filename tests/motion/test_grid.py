@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion import Grid
 from support.arms import robot_named
 
 

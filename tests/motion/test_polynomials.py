@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from selfmotion.model.motion.spline import evaluated, inner_roots, may_vanish
+from selfmotion.model.motion import evaluated
+from selfmotion.model.motion.spline import inner_roots, may_vanish
 
 
 def test_roots_of_polynomials_of_all_degrees() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.model.follow.follow import null_basis_at
+from selfmotion.model.follow import null_basis_at
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, Step, batch, minimise
 from selfmotion.planning.nodes.motion import stepped

@@ -3,8 +3,8 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.model.follow.follow import null_basis_at
-from selfmotion.planning.nodes.motion import null_motion_of
+from selfmotion.model.follow import null_basis_at
+from selfmotion.planning.nodes import null_motion_of
 from support.arms import Case, robot_named, start_of
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 

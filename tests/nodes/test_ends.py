@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow.follow import null_basis_at
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import bound_conditions
+from selfmotion.model.follow import null_basis_at
+from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.nodes import Step, minimise
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.optimise import Status

@@ -6,11 +6,10 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.planning.formulation import BoundConditions, Formulation
-from selfmotion.planning.formulation.formulation import path_errors
-from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.formulation import BoundConditions, Formulation, path_errors
+from selfmotion.planning.nodes import NodeGrid, broken_intervals, forget
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import broken_intervals, forget, moved_along, stepped
+from selfmotion.planning.nodes.motion import moved_along, stepped
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of

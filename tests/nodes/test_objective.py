@@ -6,9 +6,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.model.robot import has_masses
-from selfmotion.planning.formulation.formulation import with_springs
-from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective
-from selfmotion.planning.nodes.motion import on_grid
+from selfmotion.planning.formulation import with_springs
+from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective, on_grid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
 from support.arms import PANDA_HOME, Case

@@ -7,11 +7,10 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
-from selfmotion.planning.nodes import minimise
+from selfmotion.planning.nodes import carried, conservatism, minimise, on_grid, subdivisions
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
-from selfmotion.planning.nodes.motion import on_grid, subdivisions
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
-from selfmotion.planning.nodes.rows import carried, conservatism, sampled_curve
+from selfmotion.planning.nodes.rows import sampled_curve
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, control_times, unit_bases
 from selfmotion.problem.constraints import separate_clearances
 from support.arms import PANDA_HOME

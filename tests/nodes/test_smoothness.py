@@ -5,8 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.nodes import smoothness
-from selfmotion.planning.nodes.motion import on_grid
+from selfmotion.planning.nodes import on_grid, smoothness
 from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import Quintic
 from support.arms import Case, robot_named, short_line, start_of

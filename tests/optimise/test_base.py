@@ -3,7 +3,7 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.planning.optimise.base import inverse_metric
+from selfmotion.planning.optimise import inverse_metric
 
 
 def test_defaults_are_what_is_documented() -> None:

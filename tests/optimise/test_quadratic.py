@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from selfmotion.basics import Array
-from selfmotion.planning.optimise.quadratic import minimize_quadratic
+from selfmotion.planning.optimise import minimize_quadratic
 
 
 @pytest.mark.parametrize("seed", range(40))

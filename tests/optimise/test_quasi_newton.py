@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.planning.optimise.quasi_newton import Minimum
+from selfmotion.planning.optimise import Minimum
 from support.functions import Counted, quadratic
 
 # From H0 = I, as the paper has it: these functions know no metric of their own.

@@ -9,8 +9,7 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import PolynomialNullMotion
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import bound_conditions
+from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import Eliminated, Solution, closed, solve
 from selfmotion.planning.paper.objective import residual_tangents, residuals, unmet

@@ -8,8 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
-from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion import Grid, NullMotionTable, PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import Objective
 from selfmotion.planning.rollout import FixedStart, MinimumNormMotion, Rollout

@@ -10,8 +10,7 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import bound_conditions
+from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
 from selfmotion.planning.paper import Solution, solve
 from selfmotion.planning.rollout import MinimumNormMotion, converged_minimum_norm

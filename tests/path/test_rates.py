@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.path import edges_of, spread_along, twist_rates
-from selfmotion.problem.problem.along import length_of, rest_orders
+from selfmotion.problem.problem import length_of, rest_orders
 from support.paths import pose, random_waypoints
 
 # Of the largest acceleration: times are rounded by 1e-16 of a path that lasts 1e7 times as long as

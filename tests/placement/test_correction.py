@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import selfmotion as sm
-from selfmotion.work.placement import corners
-from selfmotion.work.placement.places import Places, Tried
+from selfmotion.work.placement import Tried, corners
+from selfmotion.work.placement.places import Places
 from support.arms import robot_named
 from support.shell import invoke
 

@@ -14,9 +14,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.shell.documents import read_problem
-from selfmotion.work.placement import search
+from selfmotion.work.placement import Tried, search
 from selfmotion.work.placement.picture import in_unit, legend_of, picture_of
-from selfmotion.work.placement.places import Places, Tried, places_of
+from selfmotion.work.placement.places import Places, places_of
 from selfmotion.work.placement.search import Box, Descent, finalists
 from support.arms import robot_named
 from support.shell import complaint, invoke

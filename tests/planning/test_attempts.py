@@ -11,8 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import BreakdownError, Counts
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import keeps_off_itself
+from selfmotion.planning.formulation import Formulation, keeps_off_itself
 from selfmotion.planning.planner import planner, verdicts
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes

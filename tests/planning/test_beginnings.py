@@ -8,8 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.planning.nodes import NodeMotion, Optimum, Step, minimise
-from selfmotion.planning.nodes.motion import centred
+from selfmotion.planning.nodes import NodeMotion, Optimum, Step, centred, minimise
 from selfmotion.planning.planner import local_search
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.outcomes import on_the_way

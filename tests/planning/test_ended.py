@@ -13,8 +13,8 @@ from selfmotion.certificate import Tolerance
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import NodeMotion
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.planner import judging, outcomes, steps, verdicts
-from selfmotion.planning.planner.effort import Deadline, Effort, Search
+from selfmotion.planning.planner import Deadline, Search, judging, outcomes, steps, verdicts
+from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.guess import Guess, on_start
 from selfmotion.planning.planner.judging import Judged
 from selfmotion.planning.planner.largest_part import Part

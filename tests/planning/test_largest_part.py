@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.model.follow import Follows
-from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.guess import Guess

@@ -5,8 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
-from selfmotion.model.follow import Coordinates
-from selfmotion.model.follow.relaxed import within_limits
+from selfmotion.model.follow import Coordinates, within_limits
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.rough import far_from_usual, wound_back

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.formulation.formulation import keeps_off_itself
+from selfmotion.planning.formulation import Formulation, keeps_off_itself
 from selfmotion.planning.planner.solution import Solution
 from support.arms import robot_named
 

@@ -9,8 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.follow import with_tolerances
-from selfmotion.model.follow.relaxed import completed
+from selfmotion.model.follow import completed, with_tolerances
 from selfmotion.planning.formulation import Formulation
 
 # Two optima of one problem, found from different nodes, differ by so much of their cost.

@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import AtRest
-from selfmotion.problem.problem.along import rest_orders, times_along
+from selfmotion.problem.problem import rest_orders, times_along
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # At rest by construction: what is left is the rounding of the path's own twist.

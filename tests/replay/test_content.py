@@ -15,7 +15,7 @@ import pytest
 import yourdfpy
 
 import selfmotion as sm
-from selfmotion.basics.errors import RobotError
+from selfmotion.basics import RobotError
 from selfmotion.model.robot import NAMED_ARMS, load_robot
 from selfmotion.shell.replay import three
 from selfmotion.shell.replay.content import page_content

@@ -9,7 +9,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.shell.replay import write_replay
-from selfmotion.work.batch.folder import Folder, Row
+from selfmotion.work.batch import Row
+from selfmotion.work.batch.folder import Folder
 from support.layouts import WIDTHS, chromium, faults
 from support.replay_plans import planar_plan, two_seams
 

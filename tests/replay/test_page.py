@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics.errors import FileFormatError, ProblemError
+from selfmotion.basics import FileFormatError, ProblemError
 from selfmotion.shell.replay import notebook_html, replay_html, write_replay
 from support.replay_plans import arm_plan, planar_plan
 

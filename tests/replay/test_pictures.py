@@ -14,7 +14,7 @@ import psutil
 import pytest
 from PIL import Image
 
-from selfmotion.basics.errors import RenderError
+from selfmotion.basics import RenderError
 from selfmotion.shell.replay import browser, figure, render_gif, render_png
 from support.places import TESTS
 from support.replay_plans import arm_plan, planar_plan

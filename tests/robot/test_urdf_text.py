@@ -7,8 +7,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.robot import urdf_text
-from selfmotion.model.robot.urdf_text import Packages
+from selfmotion.model.robot import Packages, urdf_text
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload
 from support.files_of_people import arm, chain_elements, described_package, with_arguments

@@ -7,8 +7,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
-from selfmotion.model.motion import NullMotionTable
-from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion import Grid, NullMotionTable
 from selfmotion.planning.rollout import FixedStart, Rollout
 from support.arms import Case, central_difference, objective_of, robot_named, short_line, start_of
 from support.rollouts import random_epsilon, rollout_of

@@ -5,8 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow.follow import only_tip
-from selfmotion.model.follow.relaxed import completed
+from selfmotion.model.follow import completed, only_tip
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times

@@ -7,8 +7,7 @@ import selfmotion as sm
 from selfmotion.model.follow import Coordinates, Follows
 from selfmotion.model.kernels import carried
 from selfmotion.model.robot import null_space
-from selfmotion.planning.search import spread
-from selfmotion.planning.search.manifold import Manifold
+from selfmotion.planning.search import Manifold, spread
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of

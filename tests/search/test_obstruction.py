@@ -9,15 +9,8 @@ from scipy.interpolate import make_interp_spline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search import single_poses
-from selfmotion.planning.search.curves import SPACING
-from selfmotion.planning.search.obstruction import (
-    Obstruction,
-    least_deviation,
-    least_excess,
-    nearest_place,
-    obstruction,
-)
+from selfmotion.planning.search import SPACING, Obstruction, obstruction, single_poses
+from selfmotion.planning.search.obstruction import least_deviation, least_excess, nearest_place
 from selfmotion.planning.search.single_poses import SinglePoses
 from support.arms import PANDA_HOME, robot_named
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array, silent
-from selfmotion.basics.errors import NoSequenceError
+from selfmotion.basics import Array, NoSequenceError, silent
 from selfmotion.model.follow import Follows
-from selfmotion.planning.search.manifold import Manifold, OnPath
+from selfmotion.planning.search import Manifold
+from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.sampled import sampled_layers
 from selfmotion.planning.search.sequences import best_sequences
 from selfmotion.planning.search.vertices import Admissible

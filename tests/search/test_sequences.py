@@ -8,8 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array, silent
-from selfmotion.basics.errors import NoSequenceError
+from selfmotion.basics import Array, NoSequenceError, silent
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search import Sequence
 from selfmotion.planning.search.sequences import best_sequences, curve_layers

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow.relaxed import within_limits
+from selfmotion.model.follow import within_limits
 from selfmotion.planning.search import carried, start_candidates
 from support.arms import Case
 from support.two_arms import both_arms

@@ -20,7 +20,7 @@ from selfmotion.paper.study.published import (
     published_null_motion,
 )
 from selfmotion.paper.study.results import Chapter, Table
-from selfmotion.problem.costs.samples import Samples
+from selfmotion.problem.costs import Samples
 from support.followed import standing
 
 # The whole study, reduced, takes half a minute.

@@ -13,9 +13,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from selfmotion.model.collision.bodies import Body
+from selfmotion.model.collision import Body, Solid
 from selfmotion.model.collision.distances import HullDistances
-from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import RobotModel, load_robot
 
 # What a direction separates by may miss, and a nearest point [m]: GJK ends at a relative 1e-9 of

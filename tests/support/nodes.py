@@ -4,7 +4,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.model.follow.relaxed import completed
+from selfmotion.model.follow import completed
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion

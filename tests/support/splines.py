@@ -7,8 +7,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.paper import Objective
-from selfmotion.planning.paper.objective import node_tangents
+from selfmotion.planning.paper import Objective, node_tangents
 from selfmotion.planning.rollout import MinimumNormMotion
 
 # Conditions that come this near to being broken by x = 0 are asked for.

@@ -10,9 +10,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
-from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.model.motion.grid import Grid
-from selfmotion.model.task.damping import DampingLaw
+from selfmotion.model.motion import Grid, NullMotionTable, PolynomialNullMotion
+from selfmotion.model.task import DampingLaw
 from selfmotion.planning.rollout import FixedStart, Rollout
 from selfmotion.problem.costs import OffPath
 from support.arms import Case, central_difference, objective_of
