@@ -213,7 +213,7 @@ def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch)
         planned(clear_of(high), warm_start=before)
     # Nor is a move kept that goes through it.
     apart = clear_of(high)
-    asked = work.JobSettings(panda, (), apart, 1, 1.0, 0)
+    asked = work.JobSettings(panda, (), (apart,), 1, 1.0, 0)
     at_work = work.Work(
         asked, ResultCache(None, sm.Tolerance(), {}), None, silent, EarlierProgram(before)
     )

@@ -228,6 +228,47 @@ def test_all_bodies_are_kept_as_far_as_was_asked_by_one_clearance() -> None:
     assert not step(sm.constraints.Clearance([post], 0.03)).unchecked({"post": post}, asked)
 
 
+def test_a_job_keeps_each_of_several_clearances(tmp_path: Path) -> None:
+    """Every seam and move by its own distance; what is left behind by that of the first."""
+    post, clamp, left = (
+        sm.obstacles.Box(name, place, [0.1, 0.1, 0.1])
+        for name, place in (
+            ("post", [0.0, -0.6, 0.6]), ("clamp", [0.0, 0.8, 0.6]), ("left", [0.45, -0.4, 0.05]),
+        )
+    )  # fmt: skip
+    near, far = sm.constraints.Clearance([post], 0.01), sm.constraints.Clearance([clamp], 0.02)
+    seams = [replace(SEAMS[0], leaves=[left]), replace(SEAMS[1], after=["one"])]
+    robot = robot_named("panda")
+    program = sm.plan_job(robot, seams, clearance=[near, far], **ASKED).require()
+    asked = {0.01: {"post"}, 0.02: {"clamp"}}
+    for number, step in enumerate(program.steps):
+        if number and program.steps[number - 1].name == "one":
+            asked = {0.01: {"post", "left"}, 0.02: {"clamp"}}
+        each = [item for item in step.constraints if isinstance(item, sm.constraints.Clearance)]
+        assert {item.distance: {body.name for body in item.obstacles} for item in each} == asked
+    program.save(tmp_path / "program.npz")
+    again = sm.load_program(tmp_path / "program.npz")
+    assert again.verified
+    given = {"warm_start": again, **ASKED}
+    same = sm.plan_job(robot, seams, clearance=[near, far], **given)
+    for name, plan in same.plans.items():
+        np.testing.assert_array_equal(plan.trajectory.q, program.plans[name].trajectory.q)
+    # Each of them is asked for: a step that is not judged by one of them is told.
+    for gone in (near, far):
+        first = program.steps[0]
+        rest = tuple(
+            item for item in first.made.constraints
+            if getattr(item, "distance", None) != gone.distance
+        )  # fmt: skip
+        steps = (replace(first, made=replace(first.made, constraints=rest)), *program.steps[1:])
+        name = gone.obstacles[0].name
+        assert f"is not checked against '{name}'" in replace(program, steps=steps).verdict
+    farther = [near, replace(far, distance=0.021)]
+    other = sm.plan_job(robot, seams, clearance=farther, **given)
+    assert other.verified
+    assert "what the job is kept clear of is another" in str(other.kept)
+
+
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])
 def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
     """Its first polynomial begins without acceleration, and so the program is verified."""

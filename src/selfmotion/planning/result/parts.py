@@ -403,7 +403,7 @@ class PartsAsked:
             for text in another_tool(move.robot, problem.robot):
                 yield f"move {number}: {text}"
             if move.trajectory is not None:
-                for text in not_judged_by(move.constraints, kept, None):
+                for text in not_judged_by(move.constraints, kept):
                     yield f"move {number}: {text}"
         pieces = []
         for number, plan in enumerate(plans, 1):

@@ -24,7 +24,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Relaxation, Task
 from selfmotion.planning.result.move import Move
 from selfmotion.planning.result.plan import Plan
-from selfmotion.problem.constraints import Clearance, Constraint, clearances_among
+from selfmotion.problem.constraints import Clearance, Constraint, as_clearances, clearances_among
 from selfmotion.problem.problem import Problem, arm_rest_orders, rest_orders
 
 # Paths with other descriptions are the same if they are nearer than _SAME at their marks, and at
@@ -49,7 +49,7 @@ class MotionSpecification:
     relaxations : sequence of Relaxation
     constraints : sequence of Constraint
         Required constraints, besides `clearance`.
-    clearance : Clearance or None
+    clearance : Clearance or sequence of Clearance, optional
         Smallest distance of bodies.
     tolerance : Tolerance
         Largest error from the path.
@@ -64,7 +64,7 @@ class MotionSpecification:
     task: Task
     relaxations: Sequence[Relaxation] = ()
     constraints: Sequence[Constraint] = ()
-    clearance: Clearance | None = None
+    clearance: Clearance | Sequence[Clearance] | None = None
     tolerance: Tolerance = USUAL
     also: Sequence[Follow] = ()
     rest: bool = True
@@ -81,7 +81,8 @@ class MotionSpecification:
             yield "what else follows a path is another"
         if not _same_bands(problem.relaxations, self.relaxations):
             yield "other rows are relaxed"
-        yield from not_judged_by(problem.all_constraints, self.constraints, self.clearance)
+        clearances = as_clearances(self.clearance)
+        yield from not_judged_by(problem.all_constraints, self.constraints, clearances)
         yield from self._restless(problem)
         within, wanted = plan.tolerance, self.tolerance
         if not (within.position <= wanted.position and within.rotation <= wanted.rotation):
@@ -155,16 +156,19 @@ def _other_limits(judged_by: RobotModel, required: RobotModel) -> Iterator[str]:
 
 
 def not_judged_by(
-    judged: Sequence[Constraint], required: Sequence[Constraint], clearance: Clearance | None
+    judged: Sequence[Constraint],
+    required: Sequence[Constraint],
+    clearances: Sequence[Clearance] = (),
 ) -> Iterator[str]:
-    """Yield required constraints by which a motion is not judged."""
+    """Yield required constraints and clearances by which a motion is not judged."""
     known = {described(item) for item in judged}
     for item in required:
         if described(item) not in known:
             yield f"it is not judged by {type(item).__name__}, which was asked for"
     apart = clearances_among(judged)
-    if clearance is not None and not any(item.keeps_as_far(clearance) for item in apart):
-        yield "it is not judged by the clearance that was asked for"
+    for one in clearances:
+        if not any(item.keeps_as_far(one) for item in apart):
+            yield "it is not judged by the clearance that was asked for"
 
 
 def described(item: Saved) -> str:

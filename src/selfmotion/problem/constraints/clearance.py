@@ -205,7 +205,7 @@ def separate_clearances(
     Those among the constraints come first, and take the place of the default.
     """
     moved, given = clearances_among(constraints), as_clearances(clearance)
-    if moved and clearance is NO_OVERLAP:
+    if moved and len(given) == 1 and given[0] is NO_OVERLAP:
         given = ()
     return without_clearances(constraints), (*moved, *given)
 

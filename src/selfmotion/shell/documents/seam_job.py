@@ -218,12 +218,9 @@ def seam_job_of(
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first
-    apart = whole.problem.clearances
-    if len(apart) > 1:
-        raise FileFormatError(f"{file}: clearance: {len(apart)} are given, expected one for all")
     options = reader.settings(settings)
     if whole.problem.clearance is not NO_OVERLAP:
-        options["clearance"] = apart[0] if apart else None
+        options["clearance"] = whole.problem.clearance
     is_cut = any(UNJUDGED in seam.path.notes for seam in seams)
     return SeamJob(
         whole.problem.robot,

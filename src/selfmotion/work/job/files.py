@@ -213,7 +213,7 @@ def satisfies(found: Move, missing: Move, ends: Array) -> bool:
         return False
     if float(np.abs(found.motion.q[[0, -1]] - ends).max()) > _JOINED:
         return False
-    return found.verified and not any(not_judged_by(found.constraints, missing.constraints, None))
+    return found.verified and not any(not_judged_by(found.constraints, missing.constraints))
 
 
 def _archives(file: Path, count: int) -> list[Path]:
@@ -278,19 +278,19 @@ class EarlierProgram:
         seam: Seam,
         problem: Problem,
         constraints: Sequence[Constraint],
-        clearance: Clearance | None,
+        clearances: Sequence[Clearance],
     ) -> tuple[Plan | None, str]:
         """Return the plan of an unchanged seam, or the reason why there is none.
 
         It is certified anew for its `problem`, in its direction, since files of bodies may have
-        changed. `constraints` and `clearance` are those of the job.
+        changed. `constraints` and `clearances` are those of the job.
         """
         known = self.plan_of(seam)
         if seam.name not in self._of_seams:
             return None, "the earlier program does not make it"
         if known is None:
             return None, "it was made from its end to its start, and may not be any more"
-        changed = self._changed(seam, problem.robot, constraints, clearance)
+        changed = self._changed(seam, problem.robot, constraints, clearances)
         if changed:
             return None, changed
         plan, _ = known
@@ -305,7 +305,7 @@ class EarlierProgram:
         seam: Seam,
         robot: RobotModel,
         constraints: Sequence[Constraint],
-        clearance: Clearance | None,
+        clearances: Sequence[Clearance],
     ) -> str:
         """Return in words what of a seam's specification has changed; "" for nothing."""
         before = self.program.specification
@@ -320,13 +320,12 @@ class EarlierProgram:
             return "its task is another"
         if not _cost_the_same(own.costs, seam.costs):
             return "its costs are others"
-        clear = [[] if item is None else [item] for item in (before.clearance, clearance)]
         pairs: dict[str, tuple[Sequence[Any], Sequence[Any]]] = {
             "its path is another": ([own.path], [seam.path]),
             "its tolerances are others": (own.relaxations, seam.relaxations),
             "its constraints are others": (own.constraints, seam.constraints),
             "the constraints of the job are others": (before.constraints, constraints),
-            "what the job is kept clear of is another": (clear[0], clear[1]),
+            "what the job is kept clear of is another": (before.clearances, clearances),
         }
         for text, (some, others) in pairs.items():
             if _described(some) != _described(others):

@@ -46,9 +46,7 @@ class CollisionChecks:
     def is_near(self, q: Array, *bodies: Obstacle) -> bool:
         """Whether the arm at q (n,) is nearer to one of the bodies than the clearance allows."""
         clearance = self._settings.clearance_from(bodies)
-        return clearance is not None and bool(
-            clearance.model(self._settings.robot).distance(q).value < clearance.distance
-        )
+        return clearance.model(self._settings.robot).distance(q).value < clearance.distance
 
     def collisions(self, plan: Plan, avoided: Obstacles) -> tuple[set[str], str]:
         """Return the names of obstacles that a plan collides with, and a sentence on the first."""
@@ -58,10 +56,8 @@ class CollisionChecks:
         while new := {n: item for n, item in avoided.items() if n not in clear and n not in met}:
             clearance = settings.clearance_from(tuple(new.values()))
             motion = FinishedMotion(settings.robot, plan.trajectory)
-            found = (
-                None if clearance is None else clearance.requirement(settings.robot).judge(motion)
-            )
-            if found is None or found.satisfied:
+            found = clearance.requirement(settings.robot).judge(motion)
+            if found.satisfied:
                 clear |= set(new)
                 break
             why = why or found.text

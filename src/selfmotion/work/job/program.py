@@ -215,18 +215,20 @@ class Program:
     def _unchecked(self) -> Iterator[str]:
         """Yield steps that are not checked against an obstacle that is there by then."""
         specification = self.specification
-        obstacles: dict[str, Obstacle] = {}
-        clearance = None
+        asked: tuple[Clearance | None, ...] = (None,)
         if specification is not None:
-            obstacles = {item.name: item for item in specification.obstacles}
-            clearance = specification.clearance or Clearance(distance=0.0)
+            asked = specification.clearances or (Clearance(distance=0.0),)
+        each = [
+            (clearance, {} if clearance is None else {x.name: x for x in clearance.obstacles})
+            for clearance in asked
+        ]
         for step in self.steps:
-            unchecked = step.unchecked(obstacles, clearance)
-            if unchecked:
-                yield (
-                    f"'{step.name}' is not checked against '{unchecked[0]}', which is there by then"
-                )
-            obstacles |= {item.name: item for item in step.leaves}
+            named = (name for one, bodies in each for name in step.unchecked(bodies, one))
+            unchecked = next(named, None)
+            if unchecked is not None:
+                yield f"'{step.name}' is not checked against '{unchecked}', which is there by then"
+            # What is left behind is kept clear of as the first clearance says.
+            each[0][1].update((item.name, item) for item in step.leaves)
 
     def _misplaced_events(self) -> Iterator[str]:
         """Yield events at times outside of their step."""

@@ -189,7 +189,7 @@ def plan_job(
     end: npt.ArrayLike | None = None,
     order: str = "free",
     constraints: Sequence[Constraint] = KEPT,
-    clearance: Clearance | None = NO_OVERLAP,
+    clearance: Clearance | Sequence[Clearance] | None = NO_OVERLAP,
     branches: int = 4,
     seconds_per_cost: float = 0.0,
     move_seconds: float = 10.0,
@@ -224,8 +224,9 @@ def plan_job(
         list. In either case `Seam.either_way` says whether directions are free.
     constraints : sequence of Constraint
         What all seams and moves must keep; see `Problem`.
-    clearance : Clearance, optional
-        What keeps the arm apart from obstacles and itself; see `Problem.clearance`.
+    clearance : Clearance or sequence of Clearance, optional
+        What keeps the arm apart from obstacles and itself; see `Problem.clearance`. What seams
+        leave behind is kept clear of as the first one says.
     branches : int
         Motions in different configurations that are planned for each seam.
     seconds_per_cost : float
@@ -280,7 +281,7 @@ def plan_job(
     settings = JobSettings(
         robot,
         _checked_constraints(constraints),
-        _checked_clearance(clearance),
+        as_clearances(clearance),
         as_whole(branches, "branches", 1, 1000),
         as_number(move_seconds, "move_seconds", above=0.0),
         as_whole(rng, "rng", 0, 2**63),
@@ -297,7 +298,7 @@ def plan_job(
     held = nullcontext() if executor is not None else held_interruption()
     with held:
         cache = ResultCache(None if folder is None else as_path(folder), Tolerance(), {})
-        kept = {"constraints": settings.constraints, "clearance": settings.clearance}
+        kept = {"constraints": settings.constraints, "clearances": settings.clearances}
         specification = _specification(listed, not is_free, ends, arm=arm_digest(robot), **kept)
         make = partial(Work, settings, cache, executor, told)
         try:
@@ -407,13 +408,6 @@ def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint,
             "what seams leave behind is kept clear of as well"
         )
     return listed
-
-
-def _checked_clearance(clearance: object) -> Clearance | None:
-    given = as_clearances(clearance)
-    if len(given) > 1:
-        raise ProblemError(f"clearance has {len(given)} items, expected one Clearance for a job")
-    return given[0] if given else None
 
 
 def _check_names(seams: Sequence[Seam]) -> None:

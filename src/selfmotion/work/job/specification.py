@@ -22,7 +22,7 @@ from selfmotion.planning.result import (
     elsewhere,
     not_judged_by,
 )
-from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.constraints import Clearance, Constraint, as_clearances
 from selfmotion.problem.costs import cost_from_dict
 from selfmotion.work.job.seam import JOB_END, JOB_START, Seam, Step, one_way, reversing
 
@@ -43,7 +43,8 @@ class Specification:
         Where the program begins and ends; None for anywhere.
     constraints : tuple of Constraint
         Of all seams and moves.
-    clearance : Clearance or None
+    clearances : tuple of Clearance
+        What seams leave behind is kept clear of as the first one says.
     tolerance : Tolerance
         Largest deviation of each seam from its path.
     arm : str
@@ -55,14 +56,15 @@ class Specification:
     start: Array | None = None
     end: Array | None = None
     constraints: tuple[Constraint, ...] = ()
-    clearance: Clearance | None = None
+    clearances: tuple[Clearance, ...] = ()
     tolerance: Tolerance = USUAL
     arm: str = ""
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """The obstacles that are there from the start."""
-        return () if self.clearance is None else self.clearance.obstacles
+        bodies = {body.name: body for item in self.clearances for body in item.obstacles}
+        return tuple(bodies.values())
 
     def failures(
         self, robot: RobotModel, steps: Sequence[Step], missing: Mapping[str, str]
@@ -139,20 +141,22 @@ class Specification:
     def _constraints(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield steps that are not judged by all constraints of the job."""
         wanted = [item for item in self.constraints if item.applies(robot) and not one_way(item)]
-        clearance = self.clearance if robot.urdf.has_collisions or self.obstacles else None
+        has_bodies = robot.urdf.has_collisions or bool(self.obstacles)
+        clearances = self.clearances if has_bodies else ()
         for step in steps:
-            for text in not_judged_by(step.constraints, wanted, clearance):
+            for text in not_judged_by(step.constraints, wanted, clearances):
                 yield f"'{step.name}': {text}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON-safe values; FileFormatError for values that no file can carry."""
+        clear = [item.to_dict() for item in self.clearances]
         return {
             "seams": [_seam_to_dict(seam) for seam in self.seams],
             "in_order": self.in_order,
             "start": None if self.start is None else self.start.tolist(),
             "end": None if self.end is None else self.end.tolist(),
             "constraints": [item.to_dict() for item in self.constraints],
-            "clearance": None if self.clearance is None else self.clearance.to_dict(),
+            "clearance": clear if len(clear) > 1 else (*clear, None)[0],
             "tolerance": asdict(self.tolerance),
             "arm": self.arm,
         }
@@ -162,14 +166,16 @@ class Specification:
         """Return the specification that `to_dict` described."""
         ends = (values[end] for end in ("start", "end"))
         start, end = (None if q is None else robot.configuration(q) for q in ends)
-        clearance = values["clearance"]
+        # One alone is a table, none is null.
+        given = values["clearance"]
+        clear = given if isinstance(given, list) else [] if given is None else [given]
         return cls(
             tuple(_seam_from_dict(item, robot) for item in values["seams"]),
             bool(values["in_order"]),
             start,
             end,
             tuple(restore(Constraint, item) for item in values["constraints"]),
-            None if clearance is None else restore(Constraint, clearance),
+            as_clearances([restore(Constraint, item) for item in clear]),
             # Files of earlier versions have none: then it is the usual one.
             Tolerance(**values.get("tolerance", {})),
             str(values.get("arm", "")),

@@ -62,7 +62,8 @@ class JobSettings:
     ----------
     robot : RobotModel
     constraints : tuple of Constraint
-    clearance : Clearance or None
+    clearances : tuple of Clearance
+        Bodies that come in addition are kept clear of as the first one says.
     branches : int
         Motions in different branches for each seam.
     move_seconds : float
@@ -72,22 +73,26 @@ class JobSettings:
 
     robot: RobotModel
     constraints: tuple[Constraint, ...]
-    clearance: Clearance | None
+    clearances: tuple[Clearance, ...]
     branches: int
     move_seconds: float
     seed: int
     _clearances: dict[tuple[str, ...], Clearance] = field(default_factory=dict, repr=False)
 
-    def clearance_from(self, obstacles: Sequence[Any]) -> Clearance | None:
-        """Return the clearance, with further obstacles."""
+    def clearances_with(self, obstacles: Sequence[Any]) -> tuple[Clearance, ...]:
+        """Return the clearances, the first one with further obstacles."""
         if not obstacles:
-            return self.clearance
+            return self.clearances
+        return self.clearance_from(obstacles), *self.clearances[1:]
+
+    def clearance_from(self, obstacles: Sequence[Any]) -> Clearance:
+        """Return the first clearance with further obstacles."""
         key = tuple(item.name for item in obstacles)
         if key not in self._clearances:
             # Made once for a seam and the move to it, since collision models take time.
             if len(self._clearances) >= _CACHED_CLEARANCES:
                 self._clearances.clear()
-            known = self.clearance or Clearance(distance=0.0)
+            known = self.clearances[0] if self.clearances else Clearance(distance=0.0)
             obstacles = (*known.obstacles, *obstacles)
             self._clearances[key] = replace(known, obstacles=obstacles, srdf=None)
         return self._clearances[key]
@@ -95,7 +100,7 @@ class JobSettings:
     def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
         """Return the problem of a seam, with further obstacles."""
         every = (*self.constraints, *seam.constraints)
-        constraints, clearances = separate_clearances(every, self.clearance_from(obstacles))
+        constraints, clearances = separate_clearances(every, self.clearances_with(obstacles))
         given = Problem(
             self.robot,
             seam.path,
@@ -110,11 +115,9 @@ class JobSettings:
 
     def move_constraints(self, obstacles: Sequence[Any]) -> tuple[Constraint, ...]:
         """Return the constraints of moves, with further obstacles."""
-        clearance = self.clearance_from(obstacles)
-        has_bodies = self.robot.urdf.has_collisions or bool(clearance and clearance.obstacles)
-        if clearance is None or not has_bodies:
-            return self.constraints
-        return (*self.constraints, clearance)
+        found = self.clearances_with(obstacles)
+        has_bodies = self.robot.urdf.has_collisions or any(item.obstacles for item in found)
+        return (*self.constraints, *(found if has_bodies else ()))
 
 
 class Work:
@@ -148,8 +151,8 @@ class Work:
             return None, ""
         settings, known = self.settings, self.earlier.plan_of(seam)
         problem = settings.problem(seam, turned=known is not None and known[1])
-        constraints, clearance = settings.constraints, settings.clearance
-        return self.earlier.unchanged_plan(seam, problem, constraints, clearance)
+        constraints, clearances = settings.constraints, settings.clearances
+        return self.earlier.unchanged_plan(seam, problem, constraints, clearances)
 
     def like_before(
         self, wanted: Sequence[tuple[Seam, Problem, Plan | None]]
