@@ -283,6 +283,10 @@ def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
     assert "line 4: INSERT STOP = 3: lines for a control are passed over" in inserted
     assert "line 11: CUTCOM/LEFT,XYPLAN: places are taken as they are written" in offset
     assert "GOHOME goes to a place of the machine's own" in home
+    for words, noted in (("CUTCOM/ON", True), ("CUTCOM/ON,LENGTH,4", True), ("CUTCOM/OFF", False)):
+        file = written(tmp_path, "c.apt", f"{words}\n{ROUND_BEGIN}GOTO/20,0,0\n")
+        (cut,) = read_cldata(file).values()
+        assert any(f"line 1: {words}: places are taken" in note for note in cut.notes) == noted
     file = written(tmp_path, "b.ncl", ROUND_BEGIN + "GOHOME/0,0,90\nGOTO/0,0,80\n")
     _, last = read_cldata(file).values()
     np.testing.assert_allclose(1e3 * last.positions, [[0, 0, 90], [0, 0, 80]])

@@ -277,6 +277,51 @@ def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
     assert len(memory) == 4
 
 
+CELL_OF_PARTS = """
+task = "position"
+start = "dexterous"
+path = { kind = "line", by = [0.0, 0.0, 0.001], duration = 1.0 }
+
+[robot.parts]
+arm = { name = "ur5", calibration = "measured.yaml" }
+"""
+
+
+def test_a_calibrated_part_is_read_once_for_many_problems(tmp_path: Path) -> None:
+    written(tmp_path, "offsets: {shoulder_lift_joint: 0.1}", "measured.yaml")
+    cell = written(tmp_path, CELL_OF_PARTS)
+    document = read_document(cell)
+    memory: dict[str, Any] = {}
+    first, second = (job_of(document, cell, memory=memory).problem for _ in range(2))
+    assert second.robot is first.robot
+    np.testing.assert_array_equal(second.start, first.start)
+    assert len(memory) == 2
+    calibrated = sm.load_robot("ur5", calibration=tmp_path / "measured.yaml")
+    np.testing.assert_allclose(
+        first.robot.pose(first.start).homogeneous,
+        calibrated.pose(first.start).homogeneous,
+        atol=ROUNDING,
+    )
+
+
+@pytest.mark.parametrize("key", ["name", "file"])
+def test_a_part_of_another_kind_has_a_start_of_its_own(key: str, tmp_path: Path) -> None:
+    kinds = ["panda", "fr3"]
+    if key == "file":
+        kinds = ["short.urdf", "long.urdf"]
+        written(tmp_path, reaching_arm(), "short.urdf")
+        written(tmp_path, reaching_arm().replace("-0.21038", "-0.31"), "long.urdf")
+    document = read_document(written(tmp_path, CELL_OF_PARTS))
+    memory: dict[str, Any] = {}
+    together, alone = [], []
+    for kind in kinds:
+        one = {**document, "robot": {"parts": {"arm": {key: kind}}}}
+        together.append(job_of(one, tmp_path / "a.toml", memory=memory).problem.start)
+        alone.append(job_of(one, tmp_path / "a.toml").problem.start)
+    np.testing.assert_array_equal(together, alone)
+    assert not np.array_equal(*alone)
+
+
 def test_grids_are_all_combinations(tmp_path: Path) -> None:
     grid = CELL + '[grid]\n"path.duration" = [3, 5]\n"costs.1.mu" = [0, 1, 2]\n'
     found = grid_documents(read_document(written(tmp_path, grid)))

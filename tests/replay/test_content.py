@@ -22,7 +22,9 @@ from selfmotion.shell.replay.content import page_content
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
 from selfmotion.shell.replay.motion import curves, key_frames
+from selfmotion.shell.replay.redundancy import FEWER_PIXELS, slices
 from selfmotion.shell.replay.whole import facts
+from support.arms import short_line
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
 
@@ -47,6 +49,17 @@ CUBE_FACES = np.array(
 def triangle_areas(vertices, faces):
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+@pytest.mark.parametrize("most", [(4, FEWER_PIXELS[1] + 2), (5, 3)])
+def test_a_slice_has_at_most_the_pixels_asked_for_and_further_ones_fewer(most):
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration("position")
+    plan = sm.plan(sm.Problem(robot, short_line(robot, start), "position", start))
+    first, second = slices(plan, most, count=2)
+    fewer = (min(most[0], FEWER_PIXELS[0]), min(most[1], FEWER_PIXELS[1]))
+    assert first.cost.shape == most
+    assert second.cost.shape == fewer
 
 
 def test_a_cube_is_split_at_its_edges():

@@ -228,15 +228,16 @@ class _Reader:
                 )
 
     def _robot(self, given: Mapping[str, Any]) -> RobotModel:
+        # Copies: what is read describes other problems of a grid as well, and names cached objects.
         values = dict(given)
-        parts = values.pop("parts", None)
+        parts = {name: dict(part) for name, part in values.pop("parts", {}).items()}
         values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
         if "packages" in values:
             values["packages"] = [self._beside(name) for name in values["packages"]]
-        for table in (values, *(parts or {}).values()):
+        for table in (values, *parts.values()):
             if "calibration" in table:
                 table["calibration"] = self._beside(table["calibration"])
-        if parts is None:
+        if "parts" not in given:
             return load_robot(self._source(values), **values)
         for key in ("name", "file", "base", "arguments", "calibration"):
             if key in values:

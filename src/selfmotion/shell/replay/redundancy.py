@@ -84,14 +84,15 @@ def maps_of(plan: Plan, whole: Whole | None) -> list[SeamMaps]:
 def slices(
     plan: Plan, most: Pixels, progress: Progress = silent, count: int = SLICES
 ) -> tuple[RedundancyMap, ...]:
-    """Return the first `count` slices of a plan, the other ones with fewer pixels."""
+    """Return the first `count` slices of a plan, of `most` pixels along either axis.
+
+    Those after the first one, and all where a body is not convex, have at most `FEWER_PIXELS`.
+    """
     are_convex = all(model.is_all_convex for model, _ in plan.problem.envelope.bodies)
-    first = most if are_convex else FEWER_PIXELS
+    fewer = (min(most[0], FEWER_PIXELS[0]), min(most[1], FEWER_PIXELS[1]))
     names = plan.redundancy_coordinates()[:count]
     return tuple(
-        plan.redundancy_map(
-            name, shape=first if k == 0 else min(first, FEWER_PIXELS), progress=progress
-        )
+        plan.redundancy_map(name, shape=most if k == 0 and are_convex else fewer, progress=progress)
         for k, name in enumerate(names)
     )
 

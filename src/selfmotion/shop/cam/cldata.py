@@ -473,7 +473,7 @@ class _Reader:
         self._move_to(goal, tool, travels=self._rapid)
 
     def _compensate(self, given: list[str]) -> None:
-        if given[:1] not in (["OFF"], ["ON"]):
+        if given[:1] != ["OFF"]:
             self.machine.note(
                 f"CUTCOM/{','.join(given)}: places are taken as they are written, those of the "
                 f"tool's centre: no radius is added"
