@@ -10,7 +10,7 @@ import selfmotion as sm
 from selfmotion.shop.cam.cldata import read_cldata
 from selfmotion.shop.cam.cuts import RAPID
 from selfmotion.shop.cam.gcode import read_gcode
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # A plunge, a slot with an arc of 20 mm and a tilted end, a retract; and another cut.
 GCODE = """%

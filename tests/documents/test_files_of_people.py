@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import selfmotion as sm
 from selfmotion.shell.cli import app
 from selfmotion.shop.cam.gcode import read_gcode
-from selfmotion.shop.cam.path_rows import Reading
+from selfmotion.shop.cam.pose_rows import Reading
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

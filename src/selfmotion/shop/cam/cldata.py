@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, lines_of
 from selfmotion.shop.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
-from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows
+from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows
 
 # Inch [m].
 _INCH = 25.4e-3

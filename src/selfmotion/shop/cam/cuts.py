@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.model.path import from_normal
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # Largest size of a file [bytes].
 _MAX_FILE_SIZE = 200_000_000
