@@ -58,4 +58,4 @@ from selfmotion.shop.controllers.thinning import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,
 )
-from selfmotion.shop.controllers.tool_frames import turned_base as turned_base
+from selfmotion.shop.controllers.work_objects import turned_base as turned_base

@@ -24,7 +24,7 @@ from selfmotion.shop.controllers.segments import (
     deviation_of,
 )
 from selfmotion.shop.controllers.thinning import operations_of
-from selfmotion.shop.controllers.tool_frames import WORLD
+from selfmotion.shop.controllers.work_objects import WORLD
 from selfmotion.work.job import Program
 
 # Largest distance of a first pose that was taught anew from the axis target before [rad or m].

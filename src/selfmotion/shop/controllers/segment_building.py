@@ -335,7 +335,7 @@ class SegmentBuilder:
     def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
         seeds = np.repeat(at[None], len(poses), axis=0)
         seeds[:, frames.external] = poses[:, 7:]
-        return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
+        return frames.inverse_kinematics(poses[:, :3], poses[:, 3:7], seeds)
 
     def _sequential(
         self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]
