@@ -19,11 +19,12 @@ from selfmotion.basics.errors import RobotError
 from selfmotion.model.robot import NAMED_ARMS, load_robot
 from selfmotion.shell.replay import three
 from selfmotion.shell.replay.content import page_content
+from selfmotion.shell.replay.facts import facts
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
 from selfmotion.shell.replay.motion import curves, key_frames
 from selfmotion.shell.replay.redundancy import FEWER_PIXELS, slices
-from selfmotion.shell.replay.whole import facts
+from selfmotion.shell.replay.replayed import PlanReplay
 from support.arms import short_line
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
@@ -206,7 +207,7 @@ def test_what_is_relaxed_is_not_shown_as_an_error():
     plan = arm_plan("panda")
     leaning = sm.plan(replace(plan.problem, relaxations=[sm.Relaxation(("rx", "ry"), 0.1)]))
     for each, relaxed in ((plan, False), (leaning, True)):
-        content = page_content([each], ["plan"], Payload(), triads=0)
+        content = page_content([PlanReplay(each)], ["plan"], Payload(), triads=0)
         assert content["plans"][0]["curves"]["relaxed"] is relaxed
     (worst,) = leaning.certificate.deviations
     name = "off the path, as relaxed (rx, ry)"
@@ -256,7 +257,7 @@ def test_joints_that_mimic_move_what_is_drawn_of_them(tmp_path):
     start = np.array([0.3, 0.4, 0.5, 0.2])
     path = sm.paths.Line(robot.pose(start), robot.pose(start), 1.0)
     plan = sm.plan(sm.Problem(robot, path, "position", start))
-    content = page_content([plan], ["a"], Payload(), triads=3)
+    content = page_content([PlanReplay(plan)], ["a"], Payload(), triads=3)
     assert content["movers"] == ["j1", "j2", "j3", "j4", "j5"]
     assert [joint["name"] for joint in content["joints"]] == ["j1", "j2", "j3", "j5"]
     poses = key_frames(robot, plan.trajectory).transforms(0)

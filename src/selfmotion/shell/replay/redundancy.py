@@ -12,7 +12,6 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.redundancy import (
     COST_COLORS,
     LEGEND,
-    PIXELS,
     Reason,
     RedundancyMap,
     excess_cost,
@@ -20,7 +19,6 @@ from selfmotion.planning.redundancy import (
 )
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json, Payload
-from selfmotion.shell.replay.whole import Whole
 
 # Quantisation of joints: 16 bits of each joint's range, some 0.1 mrad.
 _JOINT_STEPS = 2**16 - 1
@@ -70,15 +68,6 @@ class SeamMaps:
     begin: float
     name: str
     maps: tuple[RedundancyMap, ...]
-
-
-def maps_of(plan: Plan, whole: Whole | None) -> list[SeamMaps]:
-    """Return the maps for a page: of as many pixels as take about a second for a plan."""
-    if whole is None:
-        return [SeamMaps(0.0, "", slices(plan, PIXELS))]
-    if len(whole.plans) > MOST_SEAMS:
-        return []
-    return [SeamMaps(begin, name, slices(one, FEWER_PIXELS)) for begin, name, one in whole.plans]
 
 
 def slices(

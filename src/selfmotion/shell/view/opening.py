@@ -6,7 +6,8 @@ from pathlib import Path
 from selfmotion.basics import ProblemError, SelfmotionError
 from selfmotion.planning.result import Parts, load_parts, load_plan
 from selfmotion.shell.documents import job_of
-from selfmotion.shell.replay.whole import Whole
+from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay.sequence import SequenceReplay
 from selfmotion.shell.view.document import EditedPlan
 from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.motions import shown_as_written, shown_program
@@ -66,7 +67,8 @@ def _of_plan(file: Path, allow_code: bool) -> Sitting:
     except SelfmotionError as error:
         text = str(error).removeprefix(f"{file}: ")
         sitting = Sitting(file, f"the plan is shown as it is, its problem is no file's: {text}")
-        sitting.open(Found(_NOTHING, "whole", plan.certificate.verdict, plan, is_brief=False))
+        verdict = plan.certificate.verdict
+        sitting.open(Found(_NOTHING, "whole", verdict, PlanReplay(plan), is_brief=False))
         return sitting
     return Session(file, edited, allow_code=allow_code)
 
@@ -78,12 +80,12 @@ def _of_written(file: Path, program: Program) -> Sitting:
     wrong = [step for step in judged.steps if not step.verified]
     told = [f"'{step.name}': {step.verdict}" for step in wrong[:_TOLD]]
     words = "; ".join([judged.verdict, *told])
-    whole = shown_as_written(program, [ways[0] for ways in parts.motions], words)
-    whole = replace(whole, verified=judged.verified)
+    replayed = shown_as_written(program, [ways[0] for ways in parts.motions], words)
+    replayed = replace(replayed, verified=judged.verified)
     seams = program.plans
     unmade = tuple(seams[step.name].path for step in wrong if step.name in seams)
     sitting = Sitting(file, f"{file.name} is shown as it is, and judged by its job")
-    sitting.open(Found(_NOTHING, "whole", words, whole.plan, whole, unmade=unmade, is_brief=False))
+    sitting.open(Found(_NOTHING, "whole", words, replayed, unmade=unmade, is_brief=False))
     return sitting
 
 
@@ -91,6 +93,6 @@ def _of_made(file: Path, made: Program | Parts) -> Sitting:
     what = "the program" if isinstance(made, Program) else "the motion"
     source = "its job file" if isinstance(made, Program) else "its problem file"
     sitting = Sitting(file, f"{what} is shown as it is; `selfmotion view` changes {source}")
-    whole = shown_program(made) if isinstance(made, Program) else Whole.of(made)
-    sitting.open(Found(_NOTHING, "whole", made.verdict, whole.plan, whole, made, is_brief=False))
+    replayed = shown_program(made) if isinstance(made, Program) else SequenceReplay.of(made)
+    sitting.open(Found(_NOTHING, "whole", made.verdict, replayed, made, is_brief=False))
     return sitting
