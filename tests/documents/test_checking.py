@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.basics import read_document
 from selfmotion.basics.tables import ANGLES, LENGTHS, in_si
 from selfmotion.model.robot import Coordinate
-from selfmotion.shell.documents import job_of
+from selfmotion.shell.documents import plan_request_of
 from selfmotion.shell.documents.schema import json_schema
 from support.cells import CELL, written
 from support.shell import complaint
@@ -222,7 +222,7 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
             node = node[key]
         node[last] = JUNK[rng.integers(len(JUNK))]
         try:
-            job_of(document, tmp_path / "cell.toml", memory=memory)
+            plan_request_of(document, tmp_path / "cell.toml", memory=memory)
         except sm.SelfmotionError as error:
             said.append(str(error))
     assert len(said) > 75

@@ -14,7 +14,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.shell.documents import example_text, grid_documents, job_of, json_schema
+from selfmotion.shell.documents import example_text, grid_documents, json_schema, plan_request_of
 from support.arms import PANDA_HOME, robot_named
 from support.cells import CELL, written
 from support.files_of_people import reaching_arm
@@ -268,7 +268,7 @@ def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
     memory: dict[str, Any] = {}
     documents = grid_documents(read_document(written(tmp_path, grid)))
     heights = [
-        job_of(one, tmp_path / "a.toml", memory=memory)
+        plan_request_of(one, tmp_path / "a.toml", memory=memory)
         .problem.robot.pose(PANDA_HOME)
         .translation[2]
         for one, _ in documents
@@ -292,7 +292,7 @@ def test_a_calibrated_part_is_read_once_for_many_problems(tmp_path: Path) -> Non
     cell = written(tmp_path, CELL_OF_PARTS)
     document = read_document(cell)
     memory: dict[str, Any] = {}
-    first, second = (job_of(document, cell, memory=memory).problem for _ in range(2))
+    first, second = (plan_request_of(document, cell, memory=memory).problem for _ in range(2))
     assert second.robot is first.robot
     np.testing.assert_array_equal(second.start, first.start)
     assert len(memory) == 2
@@ -316,8 +316,8 @@ def test_a_part_of_another_kind_has_a_start_of_its_own(key: str, tmp_path: Path)
     together, alone = [], []
     for kind in kinds:
         one = {**document, "robot": {"parts": {"arm": {key: kind}}}}
-        together.append(job_of(one, tmp_path / "a.toml", memory=memory).problem.start)
-        alone.append(job_of(one, tmp_path / "a.toml").problem.start)
+        together.append(plan_request_of(one, tmp_path / "a.toml", memory=memory).problem.start)
+        alone.append(plan_request_of(one, tmp_path / "a.toml").problem.start)
     np.testing.assert_array_equal(together, alone)
     assert not np.array_equal(*alone)
 

@@ -19,7 +19,7 @@ from selfmotion.model.path.derived import (
     section_at_rest as section_at_rest,
 )
 from selfmotion.model.path.feed import Feed as Feed, FeedPossible as FeedPossible
-from selfmotion.model.path.feed_kept import FeedKept as FeedKept
+from selfmotion.model.path.feed_profile import FeedProfile as FeedProfile
 from selfmotion.model.path.joined import (
     Dwell as Dwell,
     Joined as Joined,

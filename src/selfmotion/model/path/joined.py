@@ -25,7 +25,7 @@ from selfmotion.model.path.base import (
     turning,
 )
 from selfmotion.model.path.feed import Feed
-from selfmotion.model.path.feed_kept import FeedKept
+from selfmotion.model.path.feed_profile import FeedProfile
 from selfmotion.model.path.shapes import Line
 from selfmotion.model.task import SE3, exp3, log3
 
@@ -127,7 +127,7 @@ class Joined(Path, kind="joined"):
         self._ends = np.cumsum([piece.duration for piece in flat])
         self.duration = float(self._ends[-1])
         for number, (one, other) in enumerate(itertools.pairwise(flat), 1):
-            _check_joint(one, other, number)
+            _check_continuous(one, other, number)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -163,7 +163,7 @@ class Joined(Path, kind="joined"):
         return read_only(np.concatenate([piece.rounded + start for piece, start in pairs]))
 
     @property
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         """See `Path.feeds`: those of all pieces."""
         starts = self._ends - [piece.duration for piece in self.pieces]
         pairs = zip(self.pieces, starts.tolist(), strict=True)
@@ -213,7 +213,7 @@ class Joined(Path, kind="joined"):
         return cls([restore(Path, piece) for piece in values["pieces"]])
 
 
-def _check_joint(one: Path, other: Path, number: int) -> None:
+def _check_continuous(one: Path, other: Path, number: int) -> None:
     end, start = one.pose(one.duration), other.pose(0.0)
     apart = float(np.linalg.norm(start.translation - end.translation))
     turned = float(np.linalg.norm(log3(end.rotation.T @ start.rotation)))
@@ -265,7 +265,7 @@ def with_run_ups(path: Feed) -> Stroke:
     """Return a path at a feed, extended at both ends by run-up and run-down.
 
     These continue the path's ends, straight, with a constant turn rate. They are as long as the
-    feed's acceleration and smoothing need, so that the feed counts (`FeedKept`), and is judged,
+    feed's acceleration and smoothing need, so that the feed counts (`FeedProfile`), and is judged,
     from the start of the path to its end.
 
     Raises
@@ -282,7 +282,7 @@ def with_run_ups(path: Feed) -> Stroke:
     for _ in range(_TRIES):
         longer, first, last = _lengthened(path, original, run_ups)
         begin, end = longer.when(np.array([first, last])).tolist()
-        counted = np.concatenate([found.own[found.counts] for found in longer.feeds])
+        counted = np.concatenate([item.path_times[item.required] for item in longer.feeds])
         if not len(counted):
             run_ups *= 2.0
             continue

@@ -79,10 +79,10 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> PlanRequest:
             f"{path}: grid: stands for many problems, which `selfmotion batch` plans "
             f"(documents.grid_items); leave it out for one"
         )
-    return job_of(document, path, allow_code=allow_code)
+    return plan_request_of(document, path, allow_code=allow_code)
 
 
-def job_of(
+def plan_request_of(
     document: Mapping[str, Any],
     file: FilePath | None = None,
     *,

@@ -25,7 +25,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, separate_clearances
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents.problem_file import job_of
+from selfmotion.shell.documents.problem_file import plan_request_of
 from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
@@ -419,7 +419,7 @@ class _Reader:
     def _read(self, own: Mapping[str, Any], where: str) -> PlanRequest:
         document = {**self._shared, **own}
         try:
-            return job_of(document, self._file, allow_code=self._code, memory=self._memory)
+            return plan_request_of(document, self._file, allow_code=self._code, memory=self._memory)
         except SelfmotionError as error:
             text = str(error).removeprefix(f"{self._file}: ")
             raise FileFormatError(f"{self._file}: {where}: {text}") from error

@@ -18,7 +18,7 @@ from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, retime
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
+from selfmotion.shell.documents import SeamJob, plan_request_of, seam_job_of
 from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.floor import Floor
@@ -151,7 +151,7 @@ class Planning:
     def _plans(self, request: Request) -> Iterator[Found]:
         """Yield what is found for a problem."""
         try:
-            job = job_of(
+            job = plan_request_of(
                 request.document, self._file, allow_code=self._allow_code, memory=self._memory
             )
             if job.goal not in GOALS:

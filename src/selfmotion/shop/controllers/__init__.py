@@ -14,8 +14,8 @@ from selfmotion.shop.controllers.judged_programs import (
     switching_faults as switching_faults,
 )
 from selfmotion.shop.controllers.motion_tables import (
-    followers as followers,
-    without_followers as without_followers,
+    mimic_joints as mimic_joints,
+    without_mimic_joints as without_mimic_joints,
 )
 from selfmotion.shop.controllers.motions import (
     FORMS as FORMS,

@@ -30,7 +30,7 @@ from selfmotion.shop.controllers.samples import MotionSamples
 _OFF = 1e-4
 
 
-def followers(robot: RobotModel) -> dict[str, str]:
+def mimic_joints(robot: RobotModel) -> dict[str, str]:
     """Return the joints that move because they mimic one of an arm's joints, and which one."""
     names = list(robot.model.names)[1:]
     moved_by = (robot.joint_names[k] for k in robot.coupling.coordinates.tolist())
@@ -38,7 +38,7 @@ def followers(robot: RobotModel) -> dict[str, str]:
     return {name: other for name, other in pairs if name not in robot.joint_names}
 
 
-def without_followers(motion: Trajectory, robot: RobotModel) -> Trajectory:
+def without_mimic_joints(motion: Trajectory, robot: RobotModel) -> Trajectory:
     """Return a motion without the joints that mimic others, where a file has them as well.
 
     Raises
@@ -46,7 +46,7 @@ def without_followers(motion: Trajectory, robot: RobotModel) -> Trajectory:
     FileFormatError
         One of them is not where what it mimics puts it.
     """
-    following = followers(robot)
+    following = mimic_joints(robot)
     own = motion.joint_names
     beside = [name for name in own if name in following]
     if not beside or any(name not in own for name in robot.joint_names):

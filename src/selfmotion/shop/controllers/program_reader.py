@@ -177,7 +177,7 @@ class ProgramReader:
             next(iter(self.comments.texts("joint targets")), ""),
             self.comments.tolerance(),
             tuple(dict.fromkeys(self.comments.texts("times"))),
-            builder.approach,
+            builder.start_gap,
             self.comments.facts(),
             self.load,
         )

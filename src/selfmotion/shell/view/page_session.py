@@ -1,4 +1,4 @@
-"""One sitting at the page: what is shown, to whom, and what of it is exported."""
+"""One session at the page: what is shown, to whom, and what of it is exported."""
 
 import threading
 from collections.abc import Callable
@@ -32,7 +32,7 @@ _OF_PARTS = {".parts": "parts (.parts)", **_OF_MOTIONS}
 _OWN = (".npz", ".program", ".parts")
 
 
-class Sitting:
+class PageSession:
     """A page that shows what a file holds, and has nothing to be changed.
 
     Parameters
