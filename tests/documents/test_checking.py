@@ -212,7 +212,7 @@ def places(node: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) -> None:
     """A problem, or one line that begins with the file: never another exception."""
     sound = read_document(written(tmp_path, CELL))
-    rng, memory, said = np.random.default_rng(0), dict[str, Any](), list[str]()
+    rng, cache, said = np.random.default_rng(0), dict[str, Any](), list[str]()
     ways = list(places(sound))
     for _ in range(150):
         document = deepcopy(sound)
@@ -222,7 +222,7 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
             node = node[key]
         node[last] = JUNK[rng.integers(len(JUNK))]
         try:
-            plan_request_of(document, tmp_path / "cell.toml", memory=memory)
+            plan_request_of(document, tmp_path / "cell.toml", cache=cache)
         except sm.SelfmotionError as error:
             said.append(str(error))
     assert len(said) > 75

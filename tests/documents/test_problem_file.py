@@ -265,16 +265,16 @@ def test_a_shape_of_a_users_own_stands_wherever_bodies_do(
 def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
     grid = CELL.replace("lock =", "base = { position = [0, 0, 0] }\nlock =")
     grid += '[grid]\n"robot.base.position" = [[0, 0, 1e-9], [0, 0, 2e-9]]\n'
-    memory: dict[str, Any] = {}
+    cache: dict[str, Any] = {}
     documents = grid_documents(read_document(written(tmp_path, grid)))
     heights = [
-        plan_request_of(one, tmp_path / "a.toml", memory=memory)
+        plan_request_of(one, tmp_path / "a.toml", cache=cache)
         .problem.robot.pose(PANDA_HOME)
         .translation[2]
         for one, _ in documents
     ]
     assert heights[1] - heights[0] == pytest.approx(1e-9, rel=1e-3)
-    assert len(memory) == 4
+    assert len(cache) == 4
 
 
 CELL_OF_PARTS = """
@@ -291,11 +291,11 @@ def test_a_calibrated_part_is_read_once_for_many_problems(tmp_path: Path) -> Non
     written(tmp_path, "offsets: {shoulder_lift_joint: 0.1}", "measured.yaml")
     cell = written(tmp_path, CELL_OF_PARTS)
     document = read_document(cell)
-    memory: dict[str, Any] = {}
-    first, second = (plan_request_of(document, cell, memory=memory).problem for _ in range(2))
+    cache: dict[str, Any] = {}
+    first, second = (plan_request_of(document, cell, cache=cache).problem for _ in range(2))
     assert second.robot is first.robot
     np.testing.assert_array_equal(second.start, first.start)
-    assert len(memory) == 2
+    assert len(cache) == 2
     calibrated = sm.load_robot("ur5", calibration=tmp_path / "measured.yaml")
     np.testing.assert_allclose(
         first.robot.pose(first.start).homogeneous,
@@ -312,11 +312,11 @@ def test_a_part_of_another_kind_has_a_start_of_its_own(key: str, tmp_path: Path)
         written(tmp_path, reaching_arm(), "short.urdf")
         written(tmp_path, reaching_arm().replace("-0.21038", "-0.31"), "long.urdf")
     document = read_document(written(tmp_path, CELL_OF_PARTS))
-    memory: dict[str, Any] = {}
+    cache: dict[str, Any] = {}
     together, alone = [], []
     for kind in kinds:
         one = {**document, "robot": {"parts": {"arm": {key: kind}}}}
-        together.append(plan_request_of(one, tmp_path / "a.toml", memory=memory).problem.start)
+        together.append(plan_request_of(one, tmp_path / "a.toml", cache=cache).problem.start)
         alone.append(plan_request_of(one, tmp_path / "a.toml").problem.start)
     np.testing.assert_array_equal(together, alone)
     assert not np.array_equal(*alone)

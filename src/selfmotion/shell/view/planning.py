@@ -68,7 +68,7 @@ class Planning:
         self._wanted: Request | None = None
         self._change = threading.Condition()
         self._closed = False
-        self._memory: dict[str, Any] = {}
+        self._cache: dict[str, Any] = {}
         self._given = given
         # The places in reach, and what they are of; those of the request that is answered.
         self._places: tuple[Any, Floor | None] = None, None
@@ -126,8 +126,8 @@ class Planning:
 
     def answer(self, request: Request) -> Found:
         """Tell of the motions that are found for a request; return the last one."""
-        if len(self._memory) > _KEPT:
-            self._memory.clear()
+        if len(self._cache) > _KEPT:
+            self._cache.clear()
         answers = self._programs if is_job(request.document) else self._plans
         found = Found(request, "none", "", None)
         for found in answers(request):
@@ -152,7 +152,7 @@ class Planning:
         """Yield what is found for a problem."""
         try:
             job = plan_request_of(
-                request.document, self._file, allow_code=self._allow_code, memory=self._memory
+                request.document, self._file, allow_code=self._allow_code, cache=self._cache
             )
             if job.goal not in GOALS:
                 raise ProblemError(
@@ -189,7 +189,7 @@ class Planning:
         """
         try:
             job = seam_job_of(
-                request.document, self._file, allow_code=self._allow_code, memory=self._memory
+                request.document, self._file, allow_code=self._allow_code, cache=self._cache
             )
         except SelfmotionError as error:
             yield Found(request, "none", self._told(error), None)

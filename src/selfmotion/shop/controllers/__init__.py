@@ -13,7 +13,7 @@ from selfmotion.shop.controllers.judged_programs import (
     stated_deviation as stated_deviation,
     switching_faults as switching_faults,
 )
-from selfmotion.shop.controllers.motion_tables import (
+from selfmotion.shop.controllers.mimic_joints import (
     mimic_joints as mimic_joints,
     without_mimic_joints as without_mimic_joints,
 )
