@@ -414,7 +414,7 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
     ("line", "said"),
     [
         ("G41 D1", "G41: the cutter's radius is not added: let CAM do so"),
-        ("G12", "G12 is not read: page 'Files' of the docs"),
+        ("G12", "G12 is not read: page 'Words of CAM files' of the docs"),
         ("G95", "G95: feeds by turns of a spindle are not read: let CAM write them by the minute"),
         ("G52 X3", "G52 is not read"),
         ("G55", "G55 after G54: where their zeros are"),

@@ -189,7 +189,8 @@ class Machine:
         )
         siemens = own if self.file.suffix.lower() == _SIEMENS_SUFFIX else ""
         return self.fault(
-            f"{what} is not read: {siemens}page 'Files' of the docs lists what is (read_path)"
+            f"{what} is not read: {siemens}page 'Words of CAM files' of the docs lists what is "
+            f"(read_path)"
         )
 
     def note(self, what: str) -> None:
