@@ -119,10 +119,10 @@ def test_another_process_compiles_where_it_can(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(jit.subprocess, "Popen", lambda command, **_: started.append(command))
     for count in (1, 2):
         monkeypatch.setattr(jit.os, "cpu_count", lambda count=count: count)
-        jit.companion(jit.FIRST_WORKS)
+        jit.compile_in_background(jit.FIRST_WORKS)
     assert [command[-2:] for command in started] == [["selfmotion.realtime.warm", "first"]]
     monkeypatch.setattr(jit, "_IS_ALONE", True)
-    assert jit.companion(jit.ALL_WORKS) is None
+    assert jit.compile_in_background(jit.ALL_WORKS) is None
     assert len(started) == 1
 
 

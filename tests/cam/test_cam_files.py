@@ -10,7 +10,7 @@ import selfmotion as sm
 from selfmotion.shop.cam.cldata import read_cldata
 from selfmotion.shop.cam.cuts import RAPID
 from selfmotion.shop.cam.gcode import read_gcode
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # A plunge, a slot with an arc of 20 mm and a tilted end, a retract; and another cut.
 GCODE = """%
@@ -283,6 +283,10 @@ def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
     assert "line 4: INSERT STOP = 3: lines for a control are passed over" in inserted
     assert "line 11: CUTCOM/LEFT,XYPLAN: places are taken as they are written" in offset
     assert "GOHOME goes to a place of the machine's own" in home
+    for words, noted in (("CUTCOM/ON", True), ("CUTCOM/ON,LENGTH,4", True), ("CUTCOM/OFF", False)):
+        file = written(tmp_path, "c.apt", f"{words}\n{ROUND_BEGIN}GOTO/20,0,0\n")
+        (cut,) = read_cldata(file).values()
+        assert any(f"line 1: {words}: places are taken" in note for note in cut.notes) == noted
     file = written(tmp_path, "b.ncl", ROUND_BEGIN + "GOHOME/0,0,90\nGOTO/0,0,80\n")
     _, last = read_cldata(file).values()
     np.testing.assert_allclose(1e3 * last.positions, [[0, 0, 90], [0, 0, 80]])
@@ -410,7 +414,7 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
     ("line", "said"),
     [
         ("G41 D1", "G41: the cutter's radius is not added: let CAM do so"),
-        ("G12", "G12 is not read: page 'Files' of the docs"),
+        ("G12", "G12 is not read: page 'Words of CAM files' of the docs"),
         ("G95", "G95: feeds by turns of a spindle are not read: let CAM write them by the minute"),
         ("G52 X3", "G52 is not read"),
         ("G55", "G55 after G54: where their zeros are"),

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.shell.cli import app, commands, documents
-from selfmotion.shell.documents import example_text, job_of
+from selfmotion.shell.documents import example_text, plan_request_of
 from support.arms import robot_named
 from support.shell import complaint, invoke
 
@@ -111,7 +111,7 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
     table = {"kind": "file", "file": str(file), "columns": ["x", "y", "z", "-"], "duration": 3.0}
     frame = {"frame": {"position": [0.4, -0.1, 0.4]}}
     document = {"task": "position", "start": "free", "path": table | frame}
-    problem = job_of({"robot": {"name": "panda"}, **document}, None).problem
+    problem = plan_request_of({"robot": {"name": "panda"}, **document}, None).problem
     sm.files.write_motion(sm.plan(problem, max_evaluations=3), tmp_path / "motion.csv")
     run = ["check", str(tmp_path / "motion.csv"), "--robot", "panda", *map(str, typed)]
     found = CliRunner().invoke(app, run)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from selfmotion.basics import FileFormatError
 from selfmotion.model.task import SE3, exp3
 from selfmotion.shop.controllers.krl import KRL
 from selfmotion.shop.controllers.krl_reader import KrlReader
@@ -155,3 +156,29 @@ def test_a_comment_is_read_as_it_is_written_alone(statement: Statement, tmp_path
     begin = text.partition(":")[0]
     for other in (text.replace(begin, begin.upper()), text.replace(":", " :", 1)):
         assert COMMENTS.find(other, "head") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "said"),
+    [
+        ("9E9", "number_of", ""),
+        ("1E7", "coordinate", ""),
+        ("1E7", "duration", ""),
+        ("1E10", "number_of", "too large, expected less than 1e[+]10"),
+        ("-1.1E7", "coordinate", "too large, expected 1e[+]07 at most"),
+        ("1.1E7", "duration", "expected a number above 0, 1e[+]07 at most"),
+        ("0", "duration", "expected a number above 0"),
+        ("1_0", "number_of", "is no number"),
+        ("1E9999", "coordinate", "is no number"),
+    ],
+)
+def test_numbers_of_programs_have_the_same_bounds_wherever_they_are_read(
+    text: str, kind: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.src").write_text("")
+    read = getattr(Lines(tmp_path / "a.src", ";"), kind)
+    if not said:
+        assert read(text) == float(text)
+        return
+    with pytest.raises(FileFormatError, match=f"a.src: line 0: .*{said}"):
+        read(text)

@@ -171,6 +171,25 @@ def test_every_named_file_exists() -> None:
             assert (ROOT / target).is_file(), target
 
 
+def places_of(table: str) -> list[tuple[str, str]]:
+    """Return the files of a map, and the names that it says are in them, "" for the file alone."""
+    places = list[tuple[str, str]]()
+    for row in table.splitlines():
+        for file, names in re.findall(r"`([\w/]+\.py)`(?:: ((?:`\w+`(?:, )?)+))?", row):
+            places += [(file, name) for name in re.findall(r"`(\w+)`", names) or [""]]
+    return places
+
+
+def test_what_the_map_of_contributing_names_is_there() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    places = places_of(text.partition("## Where is")[2].partition("\n## ")[0])
+    assert ("planning/optimise/banded.py", "interior_optimum") in places
+    for file, name in places:
+        source = (ROOT / "src" / "selfmotion" / file).read_text()
+        is_there = not name or re.search(rf"^\s*(?:def |class )?{name}\b", source, re.MULTILINE)
+        assert is_there, f"{file}: {name}"
+
+
 def test_runtime_packages_are_explained() -> None:
     text = (ROOT / "pyproject.toml").read_text()
     block = re.search(r"\ndependencies = \[(.*?)\]", text, re.DOTALL)

@@ -13,7 +13,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import ANGLES, LENGTHS, in_si, read_document
 from selfmotion.model.robot import Coordinate
-from selfmotion.shell.documents import job_of
+from selfmotion.shell.documents import plan_request_of
 from selfmotion.shell.documents.schema import json_schema
 from support.cells import CELL, written
 from support.shell import complaint
@@ -218,7 +218,7 @@ def places(node: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) -> None:
     """A problem, or one line that begins with the file: never another exception."""
     sound = read_document(written(tmp_path, CELL))
-    rng, memory, said = np.random.default_rng(0), dict[str, Any](), list[str]()
+    rng, cache, said = np.random.default_rng(0), dict[str, Any](), list[str]()
     ways = list(places(sound))
     for _ in range(150):
         document = deepcopy(sound)
@@ -228,7 +228,7 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
             node = node[key]
         node[last] = JUNK[rng.integers(len(JUNK))]
         try:
-            job_of(document, tmp_path / "cell.toml", memory=memory)
+            plan_request_of(document, tmp_path / "cell.toml", cache=cache)
         except sm.SelfmotionError as error:
             said.append(str(error))
     assert len(said) > 75

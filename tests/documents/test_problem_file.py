@@ -14,7 +14,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.shell.documents import example_text, grid_documents, job_of, json_schema
+from selfmotion.shell.documents import example_text, grid_documents, json_schema, plan_request_of
 from support.arms import PANDA_HOME, robot_named
 from support.cells import CELL, written
 from support.files_of_people import reaching_arm
@@ -265,16 +265,61 @@ def test_a_shape_of_a_users_own_stands_wherever_bodies_do(
 def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
     grid = CELL.replace("lock =", "base = { position = [0, 0, 0] }\nlock =")
     grid += '[grid]\n"robot.base.position" = [[0, 0, 1e-9], [0, 0, 2e-9]]\n'
-    memory: dict[str, Any] = {}
+    cache: dict[str, Any] = {}
     documents = grid_documents(read_document(written(tmp_path, grid)))
     heights = [
-        job_of(one, tmp_path / "a.toml", memory=memory)
+        plan_request_of(one, tmp_path / "a.toml", cache=cache)
         .problem.robot.pose(PANDA_HOME)
         .translation[2]
         for one, _ in documents
     ]
     assert heights[1] - heights[0] == pytest.approx(1e-9, rel=1e-3)
-    assert len(memory) == 4
+    assert len(cache) == 4
+
+
+CELL_OF_PARTS = """
+task = "position"
+start = "dexterous"
+path = { kind = "line", by = [0.0, 0.0, 0.001], duration = 1.0 }
+
+[robot.parts]
+arm = { name = "ur5", calibration = "measured.yaml" }
+"""
+
+
+def test_a_calibrated_part_is_read_once_for_many_problems(tmp_path: Path) -> None:
+    written(tmp_path, "offsets: {shoulder_lift_joint: 0.1}", "measured.yaml")
+    cell = written(tmp_path, CELL_OF_PARTS)
+    document = read_document(cell)
+    cache: dict[str, Any] = {}
+    first, second = (plan_request_of(document, cell, cache=cache).problem for _ in range(2))
+    assert second.robot is first.robot
+    np.testing.assert_array_equal(second.start, first.start)
+    assert len(cache) == 2
+    calibrated = sm.load_robot("ur5", calibration=tmp_path / "measured.yaml")
+    np.testing.assert_allclose(
+        first.robot.pose(first.start).homogeneous,
+        calibrated.pose(first.start).homogeneous,
+        atol=ROUNDING,
+    )
+
+
+@pytest.mark.parametrize("key", ["name", "file"])
+def test_a_part_of_another_kind_has_a_start_of_its_own(key: str, tmp_path: Path) -> None:
+    kinds = ["panda", "fr3"]
+    if key == "file":
+        kinds = ["short.urdf", "long.urdf"]
+        written(tmp_path, reaching_arm(), "short.urdf")
+        written(tmp_path, reaching_arm().replace("-0.21038", "-0.31"), "long.urdf")
+    document = read_document(written(tmp_path, CELL_OF_PARTS))
+    cache: dict[str, Any] = {}
+    together, alone = [], []
+    for kind in kinds:
+        one = {**document, "robot": {"parts": {"arm": {key: kind}}}}
+        together.append(plan_request_of(one, tmp_path / "a.toml", cache=cache).problem.start)
+        alone.append(plan_request_of(one, tmp_path / "a.toml").problem.start)
+    np.testing.assert_array_equal(together, alone)
+    assert not np.array_equal(*alone)
 
 
 def test_grids_are_all_combinations(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.shell.documents import example_text, job_of
+from selfmotion.shell.documents import example_text, plan_request_of
 
 ROOT = Path(__file__).parents[2]
 # Of a process of its own: other tests make classes, which files of this process know as well.
@@ -112,16 +112,16 @@ SEAMS: dict[str, Any] = {
 
 
 def test_a_key_that_is_refused_is_not_valid_and_the_other_way_round(tmp_path: Path) -> None:
-    memory: dict[str, Any] = {}
+    cache: dict[str, Any] = {}
     assert judge().is_valid(FULL)
-    job_of(FULL, memory=memory)
+    plan_request_of(FULL, cache=cache)
     ways = list(tables(FULL))
     assert len(ways) > 12
     for way in ways:
         wrong = spoiled(FULL, way)
         assert not judge().is_valid(wrong), way
         with pytest.raises(sm.SelfmotionError, match="nonsense"):
-            job_of(wrong, memory=memory)
+            plan_request_of(wrong, cache=cache)
 
 
 def test_and_of_jobs(tmp_path: Path) -> None:

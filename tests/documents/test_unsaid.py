@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import selfmotion as sm
 from selfmotion.shell.cli import app
 from selfmotion.shop.cam.path_files import _READERS
-from selfmotion.shop.cam.path_rows import CLDATA, PROGRAMS
+from selfmotion.shop.cam.pose_rows import CLDATA, PROGRAMS
 from support.shell import invoke
 
 CASES = Path(__file__).parents[1] / "cases"

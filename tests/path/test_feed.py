@@ -321,7 +321,7 @@ def test_a_path_made_of_another_one_keeps_a_feed_as_that_does() -> None:
     # Rounded corners are slower, and do not count.
     (own,) = sm.paths.Feed(cornered, 0.1).feeds
     assert own.kept
-    assert not sm.paths.Feed(cornered, 0.1, smoothing=1e-3).feeds[0].counts.all()
+    assert not sm.paths.Feed(cornered, 0.1, smoothing=1e-3).feeds[0].required.all()
     for name, path in derived.items():
         feed = sm.paths.Feed(path, 0.1)
         assert feed.duration == pytest.approx(sm.paths.Feed(cornered, 0.1).duration, rel=1e-3), name

@@ -41,7 +41,7 @@ def is_kept(path: sm.paths.Path, feed: float) -> bool:
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(t)
     (found,) = path.feeds
     middles = 0.5 * (t[1:] + t[:-1])
-    counts = np.interp(middles, found.t, found.counts.astype(float)) == 1.0
+    counts = np.interp(middles, found.t, found.required.astype(float)) == 1.0
     enough = (1.0 - found.within) * feed * (1.0 - 1e-3)
     return bool(speeds.max() >= enough and (speeds[counts] >= enough).all())
 

@@ -52,7 +52,7 @@ def test_the_feed_is_kept_from_begin_to_end(
     assert found.end - found.begin == pytest.approx(0.72 / feed, rel=SPLINED)
     (kept,) = found.path.feeds
     assert kept.kept
-    counted = kept.own[kept.counts]
+    counted = kept.path_times[kept.required]
     assert counted.min() <= found.begin
     assert counted.max() >= found.end
     # No longer than it has to be: without the least of the ways it is not at its feed.

@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import FinishedMotion
 from selfmotion.model.collision import CollisionModel
-from selfmotion.shell.replay.whole import describe, facts
+from selfmotion.shell.replay.facts import describe, facts
 from support.cones import downhand
 from support.own_kinematics import Arm, along
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows

@@ -19,10 +19,13 @@ from selfmotion.basics import RobotError
 from selfmotion.model.robot import NAMED_ARMS, load_robot
 from selfmotion.shell.replay import three
 from selfmotion.shell.replay.content import page_content
+from selfmotion.shell.replay.facts import facts
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
 from selfmotion.shell.replay.motion import curves, key_frames
-from selfmotion.shell.replay.whole import facts
+from selfmotion.shell.replay.redundancy import FEWER_PIXELS, slices
+from selfmotion.shell.replay.replayed import PlanReplay
+from support.arms import short_line
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
 
@@ -47,6 +50,17 @@ CUBE_FACES = np.array(
 def triangle_areas(vertices, faces):
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+@pytest.mark.parametrize("most", [(4, FEWER_PIXELS[1] + 2), (5, 3)])
+def test_a_slice_has_at_most_the_pixels_asked_for_and_further_ones_fewer(most):
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration("position")
+    plan = sm.plan(sm.Problem(robot, short_line(robot, start), "position", start))
+    first, second = slices(plan, most, count=2)
+    fewer = (min(most[0], FEWER_PIXELS[0]), min(most[1], FEWER_PIXELS[1]))
+    assert first.cost.shape == most
+    assert second.cost.shape == fewer
 
 
 def test_a_cube_is_split_at_its_edges():
@@ -193,7 +207,7 @@ def test_what_is_relaxed_is_not_shown_as_an_error():
     plan = arm_plan("panda")
     leaning = sm.plan(replace(plan.problem, relaxations=[sm.Relaxation(("rx", "ry"), 0.1)]))
     for each, relaxed in ((plan, False), (leaning, True)):
-        content = page_content([each], ["plan"], Payload(), triads=0)
+        content = page_content([PlanReplay(each)], ["plan"], Payload(), triads=0)
         assert content["plans"][0]["curves"]["relaxed"] is relaxed
     (worst,) = leaning.certificate.deviations
     name = "off the path, as relaxed (rx, ry)"
@@ -243,7 +257,7 @@ def test_joints_that_mimic_move_what_is_drawn_of_them(tmp_path):
     start = np.array([0.3, 0.4, 0.5, 0.2])
     path = sm.paths.Line(robot.pose(start), robot.pose(start), 1.0)
     plan = sm.plan(sm.Problem(robot, path, "position", start))
-    content = page_content([plan], ["a"], Payload(), triads=3)
+    content = page_content([PlanReplay(plan)], ["a"], Payload(), triads=3)
     assert content["movers"] == ["j1", "j2", "j3", "j4", "j5"]
     assert [joint["name"] for joint in content["joints"]] == ["j1", "j2", "j3", "j5"]
     poses = key_frames(robot, plan.trajectory).transforms(0)

@@ -9,7 +9,7 @@ import yaml
 
 import selfmotion as sm
 from selfmotion.model.robot.xacro_expressions import Refused, check_expression, only_arithmetic
-from selfmotion.shop.controllers.motion_tables import keyframes
+from selfmotion.shop.controllers.mujoco_keyframes import keyframes
 from selfmotion.shop.controllers.program_texts import as_word, of_word
 from support.files_of_people import arm, chain_elements
 

@@ -13,6 +13,7 @@ from selfmotion.model.robot import full_model as gate
 from selfmotion.model.robot.urdf import parse_urdf
 from selfmotion.shell.replay.content import page_content
 from selfmotion.shell.replay.meshes import Payload
+from selfmotion.shell.replay.replayed import PlanReplay
 from support.arms import robot_named
 from support.bad_urdfs import SOUND
 from support.files_of_people import finger
@@ -104,12 +105,12 @@ def test_kinematics_load_without_meshes_and_messages_name_them(
 @pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
 def test_a_replay_says_what_is_not_drawn(tmp_path: Path) -> None:
     plan = plan_of(load(tmp_path, with_mesh("visual", "none.stl")))
-    content = page_content([plan, plan], ["a", "b"], Payload(), triads=3)
+    content = page_content([PlanReplay(plan), PlanReplay(plan)], ["a", "b"], Payload(), triads=3)
     row = content["table"][0]
     assert row["label"] == "not drawn"
     assert "link 'upper': no such mesh file" in row["cells"][0][0]
     assert len(row["cells"]) == 2
-    whole = page_content([plan_of(load(tmp_path, SOUND))], ["a"], Payload(), triads=3)
+    whole = page_content([PlanReplay(plan_of(load(tmp_path, SOUND)))], ["a"], Payload(), triads=3)
     assert whole["table"][0]["label"] == "verdict"
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import uvicorn
 
 from selfmotion.shell.view import (
-    Session,
+    EditSession,
     application,
     configuration,
     listening,
@@ -63,7 +63,7 @@ def told(data: bytes) -> dict[str, Any]:
 class Heard:
     """A page as the session knows it: what it is told."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: EditSession) -> None:
         self.session = session
         self.messages: list[dict[str, Any]] = []
         self._change = threading.Condition()
@@ -105,10 +105,10 @@ def moved(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[list[floa
 
 
 @contextmanager
-def opened(file: Path) -> Iterator[Session]:
+def opened(file: Path) -> Iterator[EditSession]:
     """Yield the session of a file; its planner ends."""
     session = open_page(file)
-    assert isinstance(session, Session)
+    assert isinstance(session, EditSession)
     try:
         yield session
     finally:
@@ -119,7 +119,7 @@ def opened(file: Path) -> Iterator[Session]:
 class Served:
     """A session with its server."""
 
-    session: Session
+    session: EditSession
     port: int
 
     @property

@@ -303,11 +303,11 @@ def test_a_controllers_program_is_judged_by_its_job(tmp_path: Path) -> None:
     program.save(job)
     signals = {"arc on": (1, True), "arc off": (1, False)}
     # The page writes it as its settings say.
-    sitting = open_page(job)
+    session = open_page(job)
     with pytest.raises(ProblemError, match="has no signal"):
-        sitting.export(".src")
-    sitting.settings = sm.files.ProgramSettings(signals=signals)
-    file.write_bytes(sitting.export(".src"))
+        session.export(".src")
+    session.settings = sm.files.ProgramSettings(signals=signals)
+    file.write_bytes(session.export(".src"))
     shown = Heard(open_page(file, job=job)).messages[-1]
     assert shown["plans"][0]["verified"]
     names = [step["name"] for step in shown["plans"][0]["steps"]]

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from selfmotion.model.task import SE3
-from selfmotion.shell.documents import job_of
+from selfmotion.shell.documents import plan_request_of
 from selfmotion.shell.view.document import Edited
 from selfmotion.shell.view.handles import dragged, handles_of
 from selfmotion.shell.view.poses import read_pose, write_pose
@@ -89,24 +89,24 @@ def document_of(given: dict[str, Any]) -> Edited:
 
 def changed(given: dict[str, Any], name: str, shown: SE3) -> tuple[dict[str, Any], Any]:
     """Return a document after a drag, and its problem."""
-    handle = handles_of(given, job_of(given).problem)[name]
+    handle = handles_of(given, plan_request_of(given).problem)[name]
     edited = document_of(given)
     edited.change(dragged(given, handle, shown), final=True)
-    return edited.document, job_of(edited.document).problem
+    return edited.document, plan_request_of(edited.document).problem
 
 
 def all_drags() -> list[tuple[str, str]]:
     return [
         (case, name)
         for case, given in CASES.items()
-        for name in handles_of(given, job_of(given).problem)
+        for name in handles_of(given, plan_request_of(given).problem)
     ]
 
 
 @pytest.mark.parametrize(("case", "name"), all_drags())
 def test_a_handle_is_where_it_was_dragged_to(case: str, name: str) -> None:
     given = CASES[case]
-    problem = job_of(given).problem
+    problem = plan_request_of(given).problem
     handle = handles_of(given, problem)[name]
     before = handle.prefix * handle.pose
     by = BY if handle.turns else SE3(np.eye(3), BY.translation)
@@ -132,7 +132,7 @@ def test_a_handle_is_where_it_was_dragged_to(case: str, name: str) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_a_handle_that_was_not_moved_changes_nothing(case: str) -> None:
     given = CASES[case]
-    for name, handle in handles_of(given, job_of(given).problem).items():
+    for name, handle in handles_of(given, plan_request_of(given).problem).items():
         document, _ = changed(given, name, handle.prefix * handle.pose)
         assert document == given, name
 
@@ -141,7 +141,7 @@ def test_a_long_drag_ends_where_a_short_one_does() -> None:
     """Handles are those of the plan that was shown when it began; the document moves on."""
     for case in ("a circle about a center", "a line"):
         given = CASES[case]
-        handle = handles_of(given, job_of(given).problem)["path"]
+        handle = handles_of(given, plan_request_of(given).problem)["path"]
         shown = handle.prefix * handle.pose * BY
         halfway = SE3(shown.rotation, shown.translation + np.array([0.1, 0.0, 0.0]))
         edited = document_of(given)
@@ -149,7 +149,7 @@ def test_a_long_drag_ends_where_a_short_one_does() -> None:
             edited.change(dragged(edited.document, handle, pose), final=False)
         direct = changed(given, "path", shown)[1].path
         times = np.linspace(0.0, direct.duration, 5)
-        found = job_of(edited.document).problem.path.samples(times)
+        found = plan_request_of(edited.document).problem.path.samples(times)
         np.testing.assert_allclose(
             found.translation, direct.samples(times).translation, atol=2.0 * NEAR
         )
@@ -157,7 +157,7 @@ def test_a_long_drag_ends_where_a_short_one_does() -> None:
 
 def test_a_start_that_does_not_fit_any_more_becomes_free() -> None:
     home = {**document(kind="circle", radius=0.1, duration=4.0), "start": "home"}
-    problem = job_of(home).problem
+    problem = plan_request_of(home).problem
     handles = handles_of(home, problem)
     for name, expected in (("path", "free"), ("base", "home"), ("tool", "home")):
         handle = handles[name]
@@ -220,7 +220,7 @@ def test_costs_of_one_kind_have_a_slider_each() -> None:
 def test_a_body_that_is_called_as_another_handle_takes_none_away(name: str) -> None:
     given = copy.deepcopy(CASES["a workpiece"])
     given["workpiece"]["obstacles"][0]["name"] = name
-    found = handles_of(given, job_of(given).problem)
+    found = handles_of(given, plan_request_of(given).problem)
     assert found[name].kind == name
     body = found[f"obstacle {name}"]
     assert (body.name, body.kind) == (f"obstacle {name}", "obstacle")

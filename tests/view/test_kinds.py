@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.model.task import SE3
-from selfmotion.shell.view import Sitting, opened as open_page
+from selfmotion.shell.view import PageSession, opened as open_page
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.handles import dragged, handles_of
 from support.views import CIRCLE, Heard, moved, opened
@@ -113,14 +113,14 @@ def test_what_stops_a_job_is_told_and_its_seams_are_red(page, monkeypatch):
 def test_a_program_is_shown_as_it_is(page, tmp_path):
     file = tmp_path / "job.program"
     file.write_bytes(page.session.export(".program"))
-    sitting = open_page(file)
-    assert type(sitting) is Sitting
-    shown = Heard(sitting).messages[-1]
+    session = open_page(file)
+    assert type(session) is PageSession
+    shown = Heard(session).messages[-1]
     assert shown["words"] == page.session.found.words
     assert shown["handles"] == shown["sliders"] == []
     with pytest.raises(ProblemError, match="`selfmotion view` changes its job file"):
-        sitting.answer({"do": "undo"})
-    assert sitting.export(".csv") == page.session.export(".csv")
+        session.answer({"do": "undo"})
+    assert session.export(".csv") == page.session.export(".csv")
 
 
 def test_a_seam_without_a_part_is_dragged_itself():
@@ -168,12 +168,12 @@ def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
     file = tmp_path / "circle.npz"
     plan.save(file)
     data = file.read_bytes()
-    sitting = open_page(file)
-    with contextlib.closing(sitting):
-        shown = Heard(sitting)
+    session = open_page(file)
+    with contextlib.closing(session):
+        shown = Heard(session)
         other = sm.plan(replace(plan.problem, costs=(sm.costs.InverseManipulability(1.0),)))
         other.save(tmp_path / "other.npz")
-        sitting.show_beside("other.npz", (tmp_path / "other.npz").read_bytes())
+        session.show_beside("other.npz", (tmp_path / "other.npz").read_bytes())
         found = shown.messages[-1]
         assert found["beside"] == "other.npz"
         costs = next(row["cells"] for row in found["table"] if row["label"] == "cost")
@@ -182,8 +182,8 @@ def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
         assert beside == pytest.approx(other.evaluate(*plan.problem.costs), rel=1e-5)
         assert beside > own
         with pytest.raises(FileFormatError, match=r"^broken\.npz"):
-            sitting.show_beside("broken.npz", b"no plan")
-        sitting.show_beside("", b"")
+            session.show_beside("broken.npz", b"no plan")
+        session.show_beside("", b"")
         assert shown.messages[-1]["beside"] == ""
     with pytest.raises(ProblemError, match="here are several seams"):
         page.session.show_beside("circle.npz", data)

@@ -1,4 +1,17 @@
-"""Foundations: errors, arrays, progress, files, compilation."""
+"""What knows nothing of robots; all others import it from here.
+
+=========== ======================================================================================
+`arrays`    types of arrays, and arguments that are checked and made numbers (``as_…``)
+`errors`    all errors, one tree
+`files`     files, read and written whole or not at all; digests
+`jit`       numerical kernels, compiled by numba once per machine
+`progress`  what is told while something runs, and interruption
+`saved`     classes that describe themselves in files, and are restored by their kind
+`series`    majorants: bounds of all derivatives of a function on intervals of time
+`tables`    documents (TOML, JSON, YAML) and tables, in SI units
+`units`     lengths and angles in words
+=========== ======================================================================================
+"""
 
 from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (
@@ -63,8 +76,8 @@ from selfmotion.basics.jit import (
     ALL_WORKS as ALL_WORKS,
     FIRST_WORKS as FIRST_WORKS,
     called as called,
-    companion as companion,
     compile_alone as compile_alone,
+    compile_in_background as compile_in_background,
     inlined as inlined,
     kernel as kernel,
     meanwhile as meanwhile,

@@ -112,7 +112,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
                 "machine (`selfmotion warm-up` compiles all) …\n"
             )
             sys.stderr.flush()
-            other = companion(FIRST_WORKS)
+            other = compile_in_background(FIRST_WORKS)
             if other is not None:
                 # Nobody else waits for the process that ends.
                 threading.Thread(target=other.communicate, daemon=True).start()
@@ -280,7 +280,7 @@ ALL_WORKS = "all"
 _IS_ALONE = False
 
 
-def companion(works: str) -> "subprocess.Popen[str] | None":
+def compile_in_background(works: str) -> "subprocess.Popen[str] | None":
     """Compile kernels in another process, in parallel; it prints their number.
 
     Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None with a single

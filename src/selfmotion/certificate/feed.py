@@ -14,7 +14,7 @@ from selfmotion.certificate.bounding import BoundedFunction, Bounds, MotionSegme
 from selfmotion.certificate.path_error import jacobians, smooth_between
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
 from selfmotion.model.follow import BoundTaskFrame
-from selfmotion.model.path import FeedKept, FeedPossible, Path, path_series
+from selfmotion.model.path import FeedPossible, FeedProfile, Path, path_series
 
 # Relative accuracy of the interpolation of speed margins.
 _FINE = 1e-3
@@ -35,13 +35,13 @@ class FeedReached(Requirement):
 
     Attributes
     ----------
-    found : FeedKept
+    found : FeedProfile
         The feed that the path itself keeps.
     follow : BoundTaskFrame
         The tip on that path.
     """
 
-    found: FeedKept
+    found: FeedProfile
     follow: BoundTaskFrame
     name: str = "feed"
 
@@ -97,8 +97,8 @@ class FeedReached(Requirement):
 
     def _when(self, own: float) -> float:
         """Return when a time of the path at the feed is passed on the one that is followed [s]."""
-        order = np.argsort(self.found.own)
-        return float(np.interp(own, self.found.own[order], self.found.t[order]))
+        order = np.argsort(self.found.path_times)
+        return float(np.interp(own, self.found.path_times[order], self.found.t[order]))
 
     def _lost(self, time: float) -> str:
         return (
@@ -156,7 +156,7 @@ def _runs(intervals: Array, counts: Flags) -> Iterator[tuple[int, int, bool]]:
         yield first, after - 1, bool(counts[first])
 
 
-def _marks(found: FeedKept, first: int, last: int) -> Array:
+def _marks(found: FeedProfile, first: int, last: int) -> Array:
     intervals, _ = found.pieces
     marks = np.asarray(found.path.marks)
     inside = (marks > intervals[first, 0]) & (marks < intervals[last, 1])

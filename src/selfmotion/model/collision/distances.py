@@ -276,7 +276,7 @@ class HullDistances:
             if row != placed:
                 # For a single joint Pinocchio returns a vector.
                 columns = pin.computeJointJacobians(chain, data, coupling.spread(q[row]))
-                jacobians[row], placed = coupling.gathered(columns.reshape(6, -1)), row
+                jacobians[row], placed = coupling.columns_by_coordinate(columns.reshape(6, -1)), row
                 pin.updateGeometryPlacements(chain, data, model, places)
             answer = pin.computeDistance(model, places, pair)
             value = answer.min_distance

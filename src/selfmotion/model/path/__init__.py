@@ -19,13 +19,11 @@ from selfmotion.model.path.derived import (
     section_at_rest as section_at_rest,
 )
 from selfmotion.model.path.feed import Feed as Feed, FeedPossible as FeedPossible
-from selfmotion.model.path.feed_kept import FeedKept as FeedKept
+from selfmotion.model.path.feed_profile import FeedProfile as FeedProfile
 from selfmotion.model.path.joined import (
     Dwell as Dwell,
     Joined as Joined,
-    Stroke as Stroke,
     with_leads as with_leads,
-    with_run_ups as with_run_ups,
 )
 from selfmotion.model.path.pace import Pace as Pace, times_when as times_when
 from selfmotion.model.path.polyline import Polyline as Polyline, merged as merged
@@ -33,6 +31,10 @@ from selfmotion.model.path.rates import (
     edges_of as edges_of,
     spread_along as spread_along,
     twist_rates as twist_rates,
+)
+from selfmotion.model.path.run_ups import (
+    Stroke as Stroke,
+    with_run_ups as with_run_ups,
 )
 from selfmotion.model.path.shapes import (
     Circle as Circle,

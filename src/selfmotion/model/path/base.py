@@ -23,7 +23,7 @@ from selfmotion.basics import (
     series,
     shown,
 )
-from selfmotion.model.path.feed_kept import FeedKept
+from selfmotion.model.path.feed_profile import FeedProfile
 from selfmotion.model.task import SE3, Task, as_pose, skew
 
 # Excess of a last time such as 50 * 0.02 that counts as rounding, relative.
@@ -116,7 +116,7 @@ class Path(Saved, ABC, family="path"):
         return np.zeros((0, 2))
 
     @property
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         """Feeds of the path with their own errors; a certificate judges them."""
         return ()
 
@@ -275,7 +275,7 @@ class _InStep(_Derived):
 
     @property
     @override
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         return self._path.feeds
 
 

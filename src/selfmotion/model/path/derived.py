@@ -20,7 +20,7 @@ from selfmotion.model.path.base import (
     path_pose,
     path_series,
 )
-from selfmotion.model.path.feed_kept import FeedKept
+from selfmotion.model.path.feed_profile import FeedProfile
 from selfmotion.model.path.pace import Pace, times_when
 from selfmotion.model.task import SE3
 
@@ -102,7 +102,7 @@ class Reversed(_Derived, kind="reversed"):
 
     @property
     @override
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
     def at_constant_speed(self) -> Reversed:
@@ -211,7 +211,7 @@ class Retimed(_Derived, kind="retimed"):
         return read_only(self.when(corners.ravel()).reshape(corners.shape))
 
     @property
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         """See `Path.feeds`: those of the original, where it is run through at its own pace."""
         # At the original's pace, whole intervals between samples of the pace.
         pace = self._pace
@@ -340,7 +340,7 @@ class Section(_Derived, kind="section"):
         return read_only(corners[corners[:, 1] > corners[:, 0]])
 
     @property
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         """See `Path.feeds`: those that count in the section."""
         found = (item.between(self._first, self._last) for item in self._path.feeds)
         return tuple(item.later(-self._first) for item in found if item)

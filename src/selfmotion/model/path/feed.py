@@ -23,8 +23,8 @@ from selfmotion.basics import (
     series,
 )
 from selfmotion.model.path.base import Path, PathSamples, PathSeries, _Derived, check_path
-from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.feed_nodes import FeedNodes, twist_sizes
+from selfmotion.model.path.feed_profile import FeedProfile
 from selfmotion.model.path.pace import Pace, times_when
 
 # Faster feeds [m/s] are errors of units.
@@ -212,53 +212,58 @@ class Feed(_Derived, kind="feed"):
         return stretches
 
     @cached_property
-    def feeds(self) -> tuple[FeedKept, ...]:
+    def feeds(self) -> tuple[FeedProfile, ...]:
         """See `Path.feeds`: errors of its own feeds, each in its interval."""
         if not self.required:
             return ()
-        t, counts, causes, asked = self._counted
-        speeds, lasts = twist_sizes(self.samples(t).twist)[:, 0], np.gradient(t)
+        t, required, causes, asked = self._required_at
+        speeds, durations = twist_sizes(self.samples(t).twist)[:, 0], np.gradient(t)
         begins = np.array([0.0, *self.when(self._asked[1:, 0]), self.duration])
         during = np.stack([begins[:-1], begins[1:]], axis=1)
-        found = []
+        profiles = []
         for feed in dict.fromkeys(self._asked[:, 1].tolist()):
             here = asked == feed
-            found.append(
-                FeedKept(
-                    *(feed, self._within, read_only(during[self._asked[:, 1] == feed])),
-                    *(read_only(t[here]), read_only(speeds[here]), read_only(lasts[here])),
-                    *(counts[here], tuple(np.array(causes)[here].tolist())),
+            profiles.append(
+                FeedProfile(
+                    asked=feed,
+                    within=self._within,
+                    during=read_only(during[self._asked[:, 1] == feed]),
+                    t=read_only(t[here]),
+                    speeds=read_only(speeds[here]),
+                    durations=read_only(durations[here]),
+                    required=required[here],
+                    causes=tuple(np.array(causes)[here].tolist()),
                     path=self,
-                    own=read_only(t[here]),
+                    path_times=read_only(t[here]),
                     rows=np.flatnonzero(here),
                 )
             )
-        return tuple(found)
+        return tuple(profiles)
 
     @property
-    def _counted(self) -> tuple[Array, Flags, list[str], Array]:
-        """Return times of nodes (K,), whether the feed counts, limiting cause, and node numbers."""
+    def _required_at(self) -> tuple[Array, Flags, list[str], Array]:
+        """Return times of nodes (K,), whether the feed is required, limiting cause, and feed."""
         nodes, window = self._nodes, self._limits["smoothing"]
         sigma, causes, corners = nodes.sigma, nodes.causes, self._path.rounded
         inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
         free = (inside.any(axis=1) | nodes.turns_on_the_spot)[nodes.narrowest]
-        times, exempt, held, asked = [], [], [], []
+        times, exempt, limits, asked = [], [], [], []
         for (part, pace, anchors), (start, _, _) in zip(nodes.ramps, self._paces, strict=True):
-            own, feeds = free[part].copy(), nodes.feeds[part]
-            own[[0, -1]] = True
+            is_exempt, feeds = free[part].copy(), nodes.feeds[part]
+            is_exempt[[0, -1]] = True
             times.append(start + pace.t + 0.5 * window)
             # Changes of feed are ramps, like the ends.
             slower = nodes.feeds[nodes.narrowest][part][anchors] < feeds
-            exempt.append(own[anchors] | slower)
-            held += [causes[part][k] for k in anchors]
+            exempt.append(is_exempt[anchors] | slower)
+            limits += [causes[part][k] for k in anchors]
             asked.append(feeds)
         t, rests = np.concatenate(times), np.concatenate(exempt)
         # From there to the next node the pace changes, and near that its mean does.
         rests = np.convolve(rests, np.ones(3), mode="same") > 0.0
         before = np.append(0, np.cumsum(rests))
         near = [np.searchsorted(t, t + side * 1.5 * window) for side in (-1, 1)]
-        counts = before[near[1]] == before[near[0]]
-        return np.clip(t, 0.0, self.duration), counts, held, np.concatenate(asked)
+        required = before[near[1]] == before[near[0]]
+        return np.clip(t, 0.0, self.duration), required, limits, np.concatenate(asked)
 
     @property
     def limits(self) -> Mapping[str, float]:
@@ -355,11 +360,11 @@ class FeedPossible:
 
     Attributes
     ----------
-    found : FeedKept
+    found : FeedProfile
         The given feed and the reached one.
     """
 
-    found: FeedKept
+    found: FeedProfile
 
     @cached_property
     def feed(self) -> float | None:
@@ -388,7 +393,7 @@ class FeedPossible:
             feed, larger = larger, _rounded(_NEAR * larger, down=True)
         return feed
 
-    def _at(self, feed: float) -> FeedKept:
+    def _at(self, feed: float) -> FeedProfile:
         """Return the errors of another feed."""
         return _kept_by(self.found.path.changed({self.found.asked: feed}), feed)
 
@@ -450,12 +455,12 @@ class FeedPossible:
         return ", or ".join([*said, f"allow it more (within={self.within:g})"])
 
 
-def _leaves(found: FeedKept) -> bool:
+def _leaves(found: FeedProfile) -> bool:
     """Return whether a feed is kept with room for the tool."""
     return found.kept and found.left_over >= _LEFT * found.within * found.asked * (1.0 - 1e-9)
 
 
-def _kept_by(path: Feed, feed: float) -> FeedKept:
+def _kept_by(path: Feed, feed: float) -> FeedProfile:
     """Return the errors of one of a path's feeds."""
     return next(item for item in path.feeds if item.asked == feed)
 

@@ -50,7 +50,7 @@ from selfmotion.model.robot.placements import (
     placements as placements,
 )
 from selfmotion.model.robot.tree_arrays import (
-    follower_of as follower_of,
+    mimic_of as mimic_of,
 )
 from selfmotion.model.robot.urdf import (
     BASE_JOINT as BASE_JOINT,

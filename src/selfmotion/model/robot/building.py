@@ -12,7 +12,7 @@ from selfmotion.model.robot.full_model import full_model, locked_configuration, 
 from selfmotion.model.robot.model import LIMITS, RobotModel
 from selfmotion.model.robot.mounting import moved_base
 from selfmotion.model.robot.named import names_of
-from selfmotion.model.robot.tree_arrays import Follower, coupling_of, follower_of, tighter_limits
+from selfmotion.model.robot.tree_arrays import Mimic, coupling_of, mimic_of, tighter_limits
 from selfmotion.model.robot.urdf import BASE_JOINT, Urdf, UrdfJoint, parse_urdf
 
 # Excess of a held joint over its limits that counts as rounding of a file [rad or m].
@@ -35,20 +35,20 @@ def build_robot(
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
     chain = moving_joints(urdf, tools, reference) if chain is None else chain
-    followers = {name: follower_of(urdf, name) for name in urdf.joints}
-    free = _free_joints(urdf, chain, tools[0], lock, reference, followers)
-    locked = _locked_joints(urdf, full, free, lock, followers)
+    mimics = {name: mimic_of(urdf, name) for name in urdf.joints}
+    free = _free_joints(urdf, chain, tools[0], lock, reference, mimics)
+    locked = _locked_joints(urdf, full, free, lock, mimics)
     configuration, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, configuration)
     name_links(urdf, model)
     every = tuple(model.names[1:])
-    moved = [name for name in followers if name not in locked and followers[name].joint in free]
+    moved = [name for name in mimics if name not in locked and mimics[name].joint in free]
     if model.nq != len(every) or not set(free) <= set(every) or not set(every) <= set(moved):
         raise RobotError(
             f"{urdf.source}: the chain to '{tools[0]}' has joints {free}, but Pinocchio built "
             f"{list(every)}"
         )
-    coupling = coupling_of(every, followers)
+    coupling = coupling_of(every, mimics)
     names = tuple(every[k] for k in coupling.masters)
     continuous = np.array([name in urdf.continuous() for name in every])
     lower, upper = tighter_limits(
@@ -88,7 +88,7 @@ def _free_joints(
     tool: str,
     lock: Mapping[str, float],
     reference: str | None,
-    followers: Mapping[str, Follower],
+    mimics: Mapping[str, Mimic],
 ) -> list[str]:
     """Return the joints of a chain that are not held; RobotError where it is none of an arm.
 
@@ -108,12 +108,12 @@ def _free_joints(
                 f"continuous or prismatic: make it fixed if the base stands, planar if it drives, "
                 f"or six joints in a row"
             )
-    by_them = [followers[joint.name] for joint in chain if joint.name not in lock]
+    by_them = [mimics[joint.name] for joint in chain if joint.name not in lock]
     moving = dict.fromkeys(item.joint for item in by_them if item.scale != 0.0)
     free = [name for name in moving if name not in lock]
     for name in lock:
-        by = followers[name].joint
-        if by != name and by in free and followers[name].scale:
+        by = mimics[name].joint
+        if by != name and by in free and mimics[name].scale:
             raise RobotError(
                 f"{urdf.source}: lock holds joint '{name}', which mimics '{by}', and that moves; "
                 f"hold '{by}'"
@@ -235,7 +235,7 @@ def _locked_joints(
     model: Any,
     free: list[str],
     lock: Mapping[str, float],
-    followers: Mapping[str, Follower],
+    mimics: Mapping[str, Mimic],
 ) -> dict[str, float]:
     """Return the positions of held joints off the chain, but for those that mimic one on it."""
     locked: dict[str, float] = {}
@@ -247,8 +247,8 @@ def _locked_joints(
         lower = model.lowerPositionLimit[joint.idx_q]
         upper = model.upperPositionLimit[joint.idx_q]
         value = lock.get(name, np.clip(0.0, lower, upper))
-        if followers[name].scale == 0.0:
-            value = followers[name].offset
+        if mimics[name].scale == 0.0:
+            value = mimics[name].offset
         elif source.mimics is not None:
             followed = source.multiplier * hold(source.mimics) + source.offset
             if name in lock and abs(followed - lock[name]) > _BESIDE:
@@ -262,7 +262,7 @@ def _locked_joints(
 
     for index in range(1, model.njoints):
         name = model.names[index]
-        moves = followers[name].joint in free and followers[name].scale != 0.0
+        moves = mimics[name].joint in free and mimics[name].scale != 0.0
         if not moves and model.joints[index].nq == 1:
             hold(name)
     return locked

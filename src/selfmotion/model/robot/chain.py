@@ -89,7 +89,7 @@ class Kinematics:
                 self.translation,
             )
             if not chain.coupling.is_plain:
-                self.jacobian[:] = chain.coupling.gathered(self._every)
+                self.jacobian[:] = chain.coupling.columns_by_coordinate(self._every)
 
     def march(
         self,

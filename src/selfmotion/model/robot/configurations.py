@@ -167,7 +167,7 @@ _IK_TOLERANCE = 1e-10
 _IK_STEPS = 100
 
 
-def solved(
+def inverse_kinematics(
     robot: RobotModel,
     pose: pin.SE3 | npt.ArrayLike,
     task: Task,

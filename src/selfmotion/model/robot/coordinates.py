@@ -282,7 +282,7 @@ def _points(robot: RobotModel, q: Array, names: tuple[str, ...]) -> list[tuple[A
         for (places, jacobians), index in zip(found, ids, strict=True):
             places[k] = pin.updateFramePlacement(model, data, index).translation
             columns = pin.getFrameJacobian(model, data, index, _AXES).reshape(6, -1)[:3]
-            jacobians[k] = robot.coupling.gathered(columns)
+            jacobians[k] = robot.coupling.columns_by_coordinate(columns)
     return found
 
 

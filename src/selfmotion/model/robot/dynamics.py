@@ -170,7 +170,8 @@ class Energy:
         for k in range(len(q)):
             found = pin.computeRNEADerivatives(self._without_gravity, data, q[k], rest, qd[k])
             by_q[k], by_qd[k] = 0.5 * (qd[k] @ found[0]), found[2] @ qd[k]
-        return self._coupling.gathered(by_q), self._coupling.gathered(by_qd)
+        by_coordinate = self._coupling.columns_by_coordinate
+        return by_coordinate(by_q), by_coordinate(by_qd)
 
     def mass(self, q: Array) -> Array:
         """Return M at q (n,), (n, n)."""
@@ -182,7 +183,7 @@ class Energy:
         """Return g at configurations (K, n), (K, n) [Nm, or N]."""
         data, at = self._model.createData(), self._coupling.spread(q)
         found = [pin.computeGeneralizedGravity(self._model, data, x).copy() for x in at]
-        return self._coupling.gathered(np.array(found))
+        return self._coupling.columns_by_coordinate(np.array(found))
 
     def gravity_slopes(self, q: Array) -> Array:
         """Return ∂g/∂q at configurations (K, n), (K, n, n)."""

@@ -17,12 +17,12 @@ from selfmotion.model.robot.configurations import (
     as_configuration,
     as_configurations,
     can_follow,
+    inverse_kinematics,
     joint_weights,
     most_dexterous,
     null_space_at,
     part_weights,
     redundancy,
-    solved,
     speed_weights,
 )
 from selfmotion.model.robot.full_model import readable_visuals, reduced_geometry, stand_in
@@ -355,7 +355,7 @@ class RobotModel:
         RobotError
             The pose is invalid.
         """
-        return solved(self, pose, Task.of(task), seed, random_numbers(rng), attempts)
+        return inverse_kinematics(self, pose, Task.of(task), seed, random_numbers(rng), attempts)
 
     def carrier_of(self, link: str) -> tuple[int, pin.SE3]:
         """Return the joint that moves a link, 0 for none, and the link's place in its frame.

@@ -84,7 +84,7 @@ class Coupling:
         """Return the velocities, or accelerations, of the model's joints (…, N)."""
         return qd if self.is_plain else np.asarray(self.scales * qd[..., self.coordinates])
 
-    def gathered(self, columns: Array) -> Array:
+    def columns_by_coordinate(self, columns: Array) -> Array:
         """Return columns by the model's joints (…, N) as those by coordinates (…, n): ∂/∂q."""
         return columns if self.is_plain else np.asarray(columns @ self.matrix)
 
@@ -94,7 +94,7 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Follower:
+class Mimic:
     """The joint that moves a joint, and how.
 
     Attributes
@@ -110,7 +110,7 @@ class Follower:
     offset: float = 0.0
 
 
-def follower_of(urdf: Urdf, name: str) -> Follower:
+def mimic_of(urdf: Urdf, name: str) -> Mimic:
     """Return the joint that finally moves a joint, through joints that mimic each other."""
     scale, offset, joint = 1.0, 0.0, urdf.joints[name]
     while joint.mimics is not None:
@@ -118,13 +118,13 @@ def follower_of(urdf: Urdf, name: str) -> Follower:
         offset += scale * joint.offset
         scale *= joint.multiplier
         joint = urdf.joints[joint.mimics]
-    return Follower(joint.name, scale, offset)
+    return Mimic(joint.name, scale, offset)
 
 
-def coupling_of(names: Sequence[str], followers: Mapping[str, Follower]) -> Coupling:
-    """Return the coupling of a model's joints, by their followers."""
-    masters = [name for name in names if followers[name].joint == name]
-    each = [followers[name] for name in names]
+def coupling_of(names: Sequence[str], mimics: Mapping[str, Mimic]) -> Coupling:
+    """Return the coupling of a model's joints, by their mimics."""
+    masters = [name for name in names if mimics[name].joint == name]
+    each = [mimics[name] for name in names]
     return Coupling(
         np.array([masters.index(item.joint) for item in each], dtype=np.int64),
         np.array([item.scale for item in each]),

@@ -204,7 +204,7 @@ def check_feeds(whose: str, paths: Sequence[Path], most: float) -> None:
     """Refuse feeds that paths do not keep by themselves, or that the tool may not have.
 
     A feed counts but for run-up, run-down and rounded corners; a motion that does not keep it there
-    is never verified (`FeedKept`). The arm is not involved.
+    is never verified (`FeedProfile`). The arm is not involved.
 
     Parameters
     ----------

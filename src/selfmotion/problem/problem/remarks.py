@@ -18,6 +18,14 @@ from selfmotion.problem.problem.fit import KEPT
 _SAMPLES = 101
 # Depth in a workpiece up to which no note is made [m].
 _DEEP = 2e-3
+# Meshes with more triangles are slow.
+_MANY_TRIANGLES = 200_000
+# A link larger than this many times its arm is in other units …
+_LARGE = 5.0
+# … for arms smaller than this, in multiples of it [m].
+_SMALL_ARM = 0.5
+# No process is as slow as this [m/s].
+_SLOWEST_FEED = 1e-4
 
 
 def inside_remarks(
@@ -46,26 +54,17 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
     """Return the depths of points (K, 3) inside an obstacle (K,) [m], 0 outside."""
     solid = Solid(obstacle.geometry(), obstacle.label)
     points = (places - obstacle.pose.translation) @ obstacle.pose.rotation
-    found = np.zeros(len(points))
+    depths = np.zeros(len(points))
     within = np.all((points > solid.low) & (points < solid.high), axis=1)
     request, point = coal.DistanceRequest(), coal.Sphere(1e-6)
     for k in np.flatnonzero(within):
         place = coal.Transform3s(np.eye(3), points[k])
         identity = coal.Transform3s.Identity()
-        away = coal.distance(point, place, solid.geometry, identity, request, coal.DistanceResult())
-        inside = solid.contains_any(points[k : k + 1]) if solid.is_mesh else away < 0.0
-        found[k] = abs(away) if inside else 0.0
-    return found
-
-
-# Meshes with more triangles are slow.
-_MANY_TRIANGLES = 200_000
-# A link larger than this many times its arm is in other units …
-_LARGE = 5.0
-# … for arms smaller than this, in multiples of it [m].
-_SMALL_ARM = 0.5
-# No process is as slow as this [m/s].
-_SLOWEST_FEED = 1e-4
+        result = coal.DistanceResult()
+        distance = coal.distance(point, place, solid.geometry, identity, request, result)
+        is_inside = solid.contains_any(points[k : k + 1]) if solid.is_mesh else distance < 0.0
+        depths[k] = abs(distance) if is_inside else 0.0
+    return depths
 
 
 def remarks_on(
@@ -75,42 +74,54 @@ def remarks_on(
     requirements: Sequence[Requirement],
     envelope: Envelope,
 ) -> Iterator[str]:
-    """Yield notes on overlapping links, suspicious limits, files and placements.
+    """Yield notes on a problem, for its user to look at.
 
-    Limits may be in other units or of unknown quantities, elements of the file ignored, and points
-    of the path inside the workpiece.
+    On elements of the URDF that are ignored, slow feeds, links that overlap or are in other units,
+    limits that are unknown, and points of the path inside the workpiece.
     """
     yield from robot.urdf.notes
+    yield from _path_remarks(follows)
+    for model, _ in envelope.bodies:
+        yield from _body_remarks(robot, model.every_body)
+        if overlap := overlap_warning(robot, model):
+            yield overlap
+    for constraint in constraints:
+        yield from constraint.remarks(robot)
+    yield from _unknown_limits(robot, constraints)
+    obstacles = [body for item in requirements for body in item.obstacles]
+    yield from (body.note for body in obstacles if isinstance(body, Mesh) and body.note)
+    yield from inside_remarks(robot, follows, obstacles)
+
+
+def _path_remarks(follows: Follows) -> Iterator[str]:
+    """Yield the paths' own notes, and feeds that look like another unit."""
     for followed in follows.items:
         task = followed.task
         is_turned = task.angular and not task.tool_axes
         yield from (note for note in followed.path.notes if is_turned or note != TURN_NOTE)
-        slow = min((item.asked for item in followed.path.feeds), default=np.inf)
-        if slow < _SLOWEST_FEED:
+        slowest = min((item.asked for item in followed.path.feeds), default=np.inf)
+        if slowest < _SLOWEST_FEED:
             yield (
-                f"a feed of {1e3 * slow:g} mm/s takes {followed.path.duration:.4g} s; are these "
-                f"m/s? Then it is feed = {1e3 * slow:g}, feed_mm = {1e6 * slow:g}"
+                f"a feed of {1e3 * slowest:g} mm/s takes {followed.path.duration:.4g} s; are these "
+                f"m/s? Then it is feed = {1e3 * slowest:g}, feed_mm = {1e6 * slowest:g}"
             )
-    for model, _ in envelope.bodies:
-        yield from _body_remarks(robot, model.every_body)
-        if said := overlap_warning(robot, model):
-            yield said
-    for item in constraints:
-        yield from item.remarks(robot)
-    for item in constraints:
+
+
+def _unknown_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
+    """Yield limits that are asked for, and that nothing says of this arm."""
+    for constraint in constraints:
         # A default, or a limit that another constraint has, needs no note.
-        known = (type(each) is type(item) and each.applies(robot) for each in constraints)
-        if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
-            option = f"{item.option}, or " if item.option else ""
-            kind, key = type(item).__name__, item.key
-            yield (
-                f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
-                f'kept; give {option}in the file [[constraints]] kind = "{kind}", {key} = …, in '
-                f"Python {kind}(…)"
-            )
-    bodies = [body for item in requirements for body in item.obstacles]
-    yield from (body.note for body in bodies if isinstance(body, Mesh) and body.note)
-    yield from inside_remarks(robot, follows, bodies)
+        is_default = any(constraint is default for default in KEPT)
+        same_kind = (other for other in constraints if type(other) is type(constraint))
+        if is_default or any(other.applies(robot) for other in same_kind):
+            continue
+        option = f"{constraint.option}, or " if constraint.option else ""
+        kind, key = type(constraint).__name__, constraint.key
+        yield (
+            f"{constraint.requirement(robot).name}: none are known of {robot.name}, so none are "
+            f'kept; give {option}in the file [[constraints]] kind = "{kind}", {key} = …, in '
+            f"Python {kind}(…)"
+        )
 
 
 def _body_remarks(robot: RobotModel, bodies: Sequence[Body]) -> Iterator[str]:

@@ -73,7 +73,7 @@ class Read(NamedTuple):
     def ways(self, path: sm.paths.Path, robot: sm.RobotModel) -> list[sm.Trajectory]:
         """Return the motions that are judged along a path."""
         found = [self.motion] if self.program is None else self.program.motions(path)
-        return [controllers.without_followers(motion, robot) for motion in found]
+        return [controllers.without_mimic_joints(motion, robot) for motion in found]
 
     def besides(
         self, robot: sm.RobotModel, constraints: Sequence[sm.constraints.Constraint]

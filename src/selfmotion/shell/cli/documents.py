@@ -17,9 +17,9 @@ from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import StageDisplay, plan_with_progress, stages
 from selfmotion.shell.documents import (
     grid_documents,
-    job_of,
     parse_setting,
     path_of,
+    plan_request_of,
     seam_job_of,
     set_key,
 )
@@ -322,7 +322,9 @@ def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
                     program = seam_job_of(document, file).plan(progress=display.stage)
                 verified, reason = program.verified, program.verdict
             else:
-                certificate = plan_with_progress(job_of(document, file).problem).certificate
+                certificate = plan_with_progress(
+                    plan_request_of(document, file).problem
+                ).certificate
                 verified, reason = certificate.verified, certificate.verdict
         except sm.errors.PlanError as error:
             verified, reason = False, str(error)
@@ -365,7 +367,7 @@ def _with_settings(
     document: dict[str, Any], file: Path | None, settings: list[str], allow_code: bool
 ) -> sm.files.PlanRequest:
     _set(document, settings)
-    job = job_of(document, file, allow_code=allow_code)
+    job = plan_request_of(document, file, allow_code=allow_code)
     _print_left_out(document, file)
     _print_flip(document, file, job)
     return job
@@ -381,7 +383,7 @@ def _print_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanR
     problem = job.problem
     if _is_in_reach(problem.robot, problem.path, problem.task):
         return
-    other = job_of({**document, "path": _flipped(path)}, file).problem
+    other = plan_request_of({**document, "path": _flipped(path)}, file).problem
     if _is_in_reach(other.robot, other.path, other.task):
         _flip_text("the path", path)
 

@@ -72,7 +72,7 @@ def export(
     files.check(rate, settings, {"targets": targets, "wobj": wobj, "mass": mass})
     planned = _loaded(file, parts=parts)
     _check_verified(planned, force, as_json)
-    _print_followers(planned.robot, out, form)
+    _print_mimic_joints(planned.robot, out, form)
     outputs.print_base(planned.robot, asked)
     if isinstance(planned, sm.Plan) and files.are_readable:
         planned = _slow_enough(planned, rate)
@@ -223,9 +223,9 @@ def _slow_enough(plan: sm.Plan, rate: float | None) -> sm.Plan:
     return found
 
 
-def _print_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
+def _print_mimic_joints(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
     """Print which joints are in no file, because they mimic others."""
-    following = controllers.followers(robot)
+    following = controllers.mimic_joints(robot)
     if following and any(
         (form or controllers.SUFFIXES.get(file.suffix)) != "mujoco" for file in out
     ):

@@ -11,7 +11,7 @@ from numba.core import event
 
 import selfmotion as sm
 from selfmotion import basics, realtime
-from selfmotion.basics import ALL_WORKS, companion
+from selfmotion.basics import ALL_WORKS, compile_in_background
 from selfmotion.realtime.warm import Compiled, small_works
 from selfmotion.shell.cli import options, outputs, summaries, tables
 from selfmotion.shell.cli.app import (
@@ -292,7 +292,7 @@ def study(
 def warm_up() -> None:
     """Compile all numerical kernels now, once per machine, so that no plan waits for them."""
     began = time.perf_counter()
-    counted, other = Compiled(), companion(ALL_WORKS)
+    counted, other = Compiled(), compile_in_background(ALL_WORKS)
     with event.install_listener("numba:compile", counted), StageDisplay(stages) as display:
         works = list(small_works())
         for number, (name, work) in enumerate(works):

@@ -19,7 +19,7 @@ from selfmotion.shell.documents.overrides import (
     write_combination as write_combination,
 )
 from selfmotion.shell.documents.problem_file import (
-    job_of as job_of,
+    plan_request_of as plan_request_of,
     read_job as read_job,
     read_problem as read_problem,
 )

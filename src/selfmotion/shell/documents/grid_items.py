@@ -8,7 +8,7 @@ from typing import Any
 from selfmotion.basics import FileFormatError, read_document
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.shell.documents.overrides import grid_documents, write_combination
-from selfmotion.shell.documents.problem_file import job_of
+from selfmotion.shell.documents.problem_file import plan_request_of
 from selfmotion.work.batch import Item
 
 
@@ -21,7 +21,7 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
         The file cannot be read, or its grid is none. What is wrong with single problems is said
         by their rows.
     """
-    memory: dict[str, Any] = {}
+    cache: dict[str, Any] = {}
     document = read_document(file)
     try:
         found = grid_documents(document)
@@ -30,7 +30,7 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
     digits = len(str(len(found) - 1))
 
     def maker(document: dict[str, Any]) -> Callable[[], PlanRequest]:
-        return lambda: job_of(document, file, allow_code=allow_code, memory=memory)
+        return lambda: plan_request_of(document, file, allow_code=allow_code, cache=cache)
 
     return [
         Item(

@@ -79,23 +79,23 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> PlanRequest:
             f"{path}: grid: stands for many problems, which `selfmotion batch` plans "
             f"(documents.grid_items); leave it out for one"
         )
-    return job_of(document, path, allow_code=allow_code)
+    return plan_request_of(document, path, allow_code=allow_code)
 
 
-def job_of(
+def plan_request_of(
     document: Mapping[str, Any],
     file: FilePath | None = None,
     *,
     allow_code: bool = False,
-    memory: dict[str, Any] | None = None,
+    cache: dict[str, Any] | None = None,
 ) -> PlanRequest:
-    """Return the job that a document describes; `file` is where it comes from. See `read_job`.
+    """Return what a document describes; `file` is where it comes from. See `read_job`.
 
-    Where many documents are read, those with the same arm share it by `memory`.
+    Where many documents are read, those with the same arm share it by `cache`.
     """
     from selfmotion.shell.documents.checking import checked
 
-    with _named(file, ""):
+    with _naming_errors(file, ""):
         if "seams" in document or "job" in document:
             raise ProblemError(
                 "has seams, so that it is a job: `selfmotion job` plans it (read_seam_job); of "
@@ -106,12 +106,12 @@ def job_of(
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
         table = placed_table(checked(raw, document))
         return _Reader(
-            file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
-        ).job()
+            file, table, functions, _key_of_joint_degrees(document), {} if cache is None else cache
+        ).request()
 
 
 @contextmanager
-def _named(file: FilePath | None, key: str) -> Iterator[None]:
+def _naming_errors(file: FilePath | None, key: str) -> Iterator[None]:
     """Say of each error which file and key it is about, where there is a file."""
     try:
         yield
@@ -125,7 +125,7 @@ def _named(file: FilePath | None, key: str) -> Iterator[None]:
         raise FileFormatError(f"{where}{text.removeprefix(f'{key}: ')}") from error
 
 
-def _degrees_per_joint(document: Any, where: str = "") -> str:
+def _key_of_joint_degrees(document: Any, where: str = "") -> str:
     """Return the first key that gives degrees joint by joint, "" for none."""
     items: Any = ()
     if isinstance(document, Mapping):
@@ -135,17 +135,17 @@ def _degrees_per_joint(document: Any, where: str = "") -> str:
     for key, value in items:
         # Where a joint slides, degrees make no sense.
         name = str(key)
-        joints = name.endswith("_deg") and name.removesuffix("_deg") in PER_JOINT
-        if joints and isinstance(value, list):
+        is_per_joint = name.endswith("_deg") and name.removesuffix("_deg") in PER_JOINT
+        if is_per_joint and isinstance(value, list):
             return f"{where}{key}"
-        found = _degrees_per_joint(value, f"{where}{key}.")
-        if found:
-            return found
+        inner = _key_of_joint_degrees(value, f"{where}{key}.")
+        if inner:
+            return inner
     return ""
 
 
 # Note on a file that says a clearance as one of its constraints.
-_MOVED = (
+_FORMER_CLEARANCE_NOTE = (
     'constraints: kind = "Clearance" is read for one more version; give the table [clearance], or '
     "[[clearance]] of several"
 )
@@ -153,33 +153,50 @@ _MOVED = (
 
 @dataclass(frozen=True, eq=False)
 class _Reader:
-    """Makes the objects that a checked table describes."""
+    """Makes the objects that a checked table describes.
+
+    Attributes
+    ----------
+    file : Path or None
+        Where the table comes from; files that it names are looked for beside it.
+    table : dict
+        Of SI units, with poses as SE3; see `checked`. Reading leaves it as it is.
+    functions : dict
+        Functions of a user's own, by the text that names them.
+    degrees_key : str
+        A key that gives degrees joint by joint; "" for none.
+    cache : dict
+        Arms and starts that are made already, by what describes them.
+    notes : list of str
+        What files that the table names are taken to say.
+    """
 
     file: FilePath | None
     table: Mapping[str, Any]
     functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
-    degrees: str = ""
-    memory: dict[str, Any] = field(default_factory=dict)
-    # What files that it names are taken to say.
+    degrees_key: str = ""
+    cache: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def job(self) -> PlanRequest:
+    def request(self) -> PlanRequest:
+        """Return the problem, and how it is planned."""
         table, file = self.table, self.file
-        with _named(file, "robot"):
-            robot = self._once(table["robot"], self._robot)
+        with _naming_errors(file, "robot"):
+            robot = self._cached(table["robot"], self._robot)
         self._check_degrees(robot)
         task = Task.of(table.get("task", "pose"))
-        with _named(file, "start"):
-            given = table.get("start", "free")
-            asked = (table["robot"], given, task.value)
-            start = self._once(asked, lambda _: start_of(given, robot, task))
-        with _named(file, "path"):
-            path = path_of(table["path"], robot, start, self._beside)
+        with _naming_errors(file, "start"):
+            setting = table.get("start", "free")
+            start = self._cached(
+                (table["robot"], setting, task.value), lambda _: start_of(setting, robot, task)
+            )
+        with _naming_errors(file, "path"):
+            path = path_of(table["path"], robot, start, self._file_beside)
         options: dict[str, Any] = {"rest": table.get("rest", True)}
         if "also" in table:
-            options["also"] = self._each("also", lambda item: self._follow(item, robot, start))
+            options["also"] = self._items("also", lambda item: self._follow(item, robot, start))
         if "null_motion" in table:
-            with _named(file, "null_motion"):
+            with _naming_errors(file, "null_motion"):
                 options["null_motion"] = restore(NullMotion, table["null_motion"])
         for name, make in (
             ("costs", lambda item: self._cost(item, robot)),
@@ -187,68 +204,69 @@ class _Reader:
             ("relaxations", lambda item: Relaxation(**item)),
         ):
             if name in table:
-                options[name] = self._each(name, make)
+                options[name] = self._items(name, make)
         if table.get("damping") is not None:
-            with _named(file, "damping"):
+            with _naming_errors(file, "damping"):
                 options["damping"] = Damping(**table["damping"])
         if isinstance(table.get("clearance"), list):
-            options["clearance"] = self._each("clearance", self._clearance)
+            options["clearance"] = self._items("clearance", self._clearance)
         elif "clearance" in table:
-            with _named(file, "clearance"):
-                one = table["clearance"]
-                options["clearance"] = None if one is None else self._clearance(one)
+            with _naming_errors(file, "clearance"):
+                values = table["clearance"]
+                options["clearance"] = None if values is None else self._clearance(values)
         if clearances_among(options.get("constraints", ())):
-            self.notes.append(_MOVED)
+            self.notes.append(_FORMER_CLEARANCE_NOTE)
             options["constraints"], options["clearance"] = separate_clearances(
                 options["constraints"], options.get("clearance", NO_OVERLAP)
             )
-        with _named(file, ""):
+        with _naming_errors(file, ""):
             problem = Problem(robot, path, task, start, **options)
         if "joint_limits" in table:
-            with _named(file, "joint_limits"):
-                limits = read_joint_limits(self._beside(table["joint_limits"]), robot)
-                self.notes.extend(joint_limit_notes(self._beside(table["joint_limits"]), robot))
+            with _naming_errors(file, "joint_limits"):
+                limits_file = self._file_beside(table["joint_limits"])
+                limits = read_joint_limits(limits_file, robot)
+                self.notes.extend(joint_limit_notes(limits_file, robot))
                 problem = replace(problem, constraints=(*problem.constraints, *limits))
-        return PlanRequest(problem, **self._settings(), notes=tuple(self.notes))
+        return PlanRequest(problem, **self._plan_options(), notes=tuple(self.notes))
 
-    def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
+    def _cached(self, values: Any, make: Callable[[Any], Any]) -> Any:
+        """Return what is made of values; the same object where the cache has it."""
         # With all digits of poses, which their own text leaves out.
         key = json.dumps(values, default=lambda pose: pose.homogeneous.tolist())
-        if key not in self.memory:
-            self.memory[key] = make(values)
-        return self.memory[key]
+        if key not in self.cache:
+            self.cache[key] = make(values)
+        return self.cache[key]
 
     def _check_degrees(self, robot: RobotModel) -> None:
         slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
-        if self.degrees and slides:
-            with _named(self.file, self.degrees):
+        if self.degrees_key and slides:
+            with _naming_errors(self.file, self.degrees_key):
                 raise ProblemError(
                     f"joint '{slides[0]}' slides, its coordinate is in metres; give rad and m "
                     f"under the key without _deg"
                 )
 
-    def _robot(self, given: Mapping[str, Any]) -> RobotModel:
-        values = dict(given)
-        parts = values.pop("parts", None)
+    def _robot(self, table: Mapping[str, Any]) -> RobotModel:
+        # Copies: what is read describes other problems of a grid as well, and names cached objects.
+        values = dict(table)
+        parts = {name: dict(part) for name, part in values.pop("parts", {}).items()}
         values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
         if "packages" in values:
-            values["packages"] = [self._beside(name) for name in values["packages"]]
-        for table in (values, *(parts or {}).values()):
-            if "calibration" in table:
-                table["calibration"] = self._beside(table["calibration"])
-        if parts is None:
+            values["packages"] = [self._file_beside(name) for name in values["packages"]]
+        for part in (values, *parts.values()):
+            if "calibration" in part:
+                part["calibration"] = self._file_beside(part["calibration"])
+        if "parts" not in table:
             return load_robot(self._source(values), **values)
         for key in ("name", "file", "base", "arguments", "calibration"):
             if key in values:
                 raise RobotError(f"{key}: is given in each of parts, where there are some")
-        base, on, arguments, measured = (
-            {part: item[key] for part, item in parts.items() if key in item}
+        by_part = {
+            key: {name: part[key] for name, part in parts.items() if key in part}
             for key in ("base", "on", "arguments", "calibration")
-        )
-        robots = {part: self._source(item, f"parts.{part}: ") for part, item in parts.items()}
-        return load_robot(
-            robots, **values, base=base, on=on, arguments=arguments, calibration=measured
-        )
+        }
+        sources = {name: self._source(part, f"parts.{name}: ") for name, part in parts.items()}
+        return load_robot(sources, **(values | by_part))
 
     def _source(self, values: dict[str, Any], where: str = "") -> str | FilePath:
         """Take the name of a robot, or its file, from a table."""
@@ -260,15 +278,15 @@ class _Reader:
             )
         if name is not None and name not in {**NAMED_ARMS, **NAMED_PARTS}:
             raise RobotError(f"{where}name: unknown robot '{name}', known: {', '.join(NAMED_ARMS)}")
-        return name if file is None else self._beside(file)
+        return name if file is None else self._file_beside(file)
 
-    def _follow(self, given: Mapping[str, Any], robot: RobotModel, start: Array | None) -> Follow:
-        if ("pose" in given) == ("path" in given):
+    def _follow(self, table: Mapping[str, Any], robot: RobotModel, start: Array | None) -> Follow:
+        if ("pose" in table) == ("path" in table):
             raise ProblemError("expected either path, or the pose that is held")
-        values = dict(given)
+        values = dict(table)
         path = values.pop("pose", None)
         if path is None:
-            path = path_of(values.pop("path"), robot, start, self._beside)
+            path = path_of(values.pop("path"), robot, start, self._file_beside)
         return Follow(path, **values)
 
     def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:
@@ -286,47 +304,53 @@ class _Reader:
         return constraint
 
     def _clearance(self, values: Mapping[str, Any]) -> Clearance:
-        given = dict(values)
-        bodies = [self._obstacle(item) for item in given.pop("obstacles", [])]
-        if "srdf" in given:
+        options = dict(values)
+        bodies = [self._obstacle(item) for item in options.pop("obstacles", [])]
+        if "srdf" in options:
             # With what the arm's own xacro is given.
             robot = self.table["robot"]
-            folders = [self._beside(name) for name in robot.get("packages", ())]
-            srdf = self._beside(given.pop("srdf"))
-            read = disabled_links(srdf, robot.get("arguments"), folders)
+            folders = [self._file_beside(name) for name in robot.get("packages", ())]
+            srdf = self._file_beside(options.pop("srdf"))
+            disabled = disabled_links(srdf, robot.get("arguments"), folders)
             self.notes.extend(srdf_notes(srdf, robot.get("arguments"), folders))
-            given["disabled"] = (*given.get("disabled", ()), *read)
-        return Clearance(tuple(bodies), **given)
+            options["disabled"] = (*options.get("disabled", ()), *disabled)
+        return Clearance(tuple(bodies), **options)
 
     def _obstacle(self, values: Mapping[str, Any]) -> Any:
-        return obstacle(values, self._beside)
+        return obstacle(values, self._file_beside)
 
-    def _each(self, name: str, make: Callable[[Any], Any]) -> list[Any]:
-        found = []
+    def _items(self, name: str, make: Callable[[Any], Any]) -> list[Any]:
+        """Return what is made of each table of a list; errors name the list and the number."""
+        items = []
         for k, item in enumerate(self.table[name]):
-            with _named(self.file, f"{name}[{k}]"):
-                found.append(make(item))
-        return found
+            with _naming_errors(self.file, f"{name}[{k}]"):
+                items.append(make(item))
+        return items
 
-    def _settings(self) -> dict[str, Any]:
+    def _plan_options(self) -> dict[str, Any]:
+        """Return how the problem is planned: the rest of a `PlanRequest`."""
         table = self.table
-        found: dict[str, Any] = {}
+        options: dict[str, Any] = {
+            "goal": table.get("goal", "best"),
+            "parts": table.get("parts"),
+            "keep": table.get("keep"),
+            "outputs": tuple(self._file_beside(name) for name in table.get("outputs", ())),
+        }
         kinds: dict[str, Any] = {"search": Search, "tolerance": Tolerance}
         for name, kind in kinds.items():
             if name in table:
-                with _named(self.file, name):
-                    found[name] = kind(**table[name])
+                with _naming_errors(self.file, name):
+                    options[name] = kind(**table[name])
         if "optimiser" in table:
-            with _named(self.file, "optimiser"):
+            with _naming_errors(self.file, "optimiser"):
                 values = dict(table["optimiser"])
                 if "line_search" in values:
                     values["line_search"] = LineSearch(**values["line_search"])
-                found["optimizer"] = QuasiNewton(**values)
+                options["optimizer"] = QuasiNewton(**values)
         if "max_evaluations" in table:
-            found["max_evaluations"] = table["max_evaluations"]
-        outputs = tuple(self._beside(name) for name in table.get("outputs", ()))
-        found |= {"outputs": outputs, "goal": table.get("goal", "best")}
-        return found | {"parts": table.get("parts"), "keep": table.get("keep")}
+            options["max_evaluations"] = table["max_evaluations"]
+        return options
 
-    def _beside(self, name: str) -> FilePath:
+    def _file_beside(self, name: str) -> FilePath:
+        """Return the place of a file that the problem file names, from the folder of that."""
         return FilePath(name) if self.file is None else self.file.parent / name

@@ -24,8 +24,8 @@ from selfmotion.model.robot import (
     TOOL_JOINT,
     RobotModel,
     UrdfPart,
-    follower_of,
     load_robot,
+    mimic_of,
     mounting_of,
     moving_joints,
     names_of,
@@ -224,7 +224,7 @@ def _check_frames(robot: RobotModel) -> None:
     """Refuse an arm that was loaded for other frames than those it follows paths with."""
     offset = robot.urdf.joints.get(TOOL_JOINT)
     moving = moving_joints(robot.urdf, robot.tools, robot.reference)
-    free = {follower_of(robot.urdf, joint.name).joint for joint in moving} - set(robot.locked)
+    free = {mimic_of(robot.urdf, joint.name).joint for joint in moving} - set(robot.locked)
     if free != set(robot.joint_names) or (offset is not None and offset.child != robot.tool):
         raise ProblemError(
             f"{robot.name}: was loaded for other frames, so that its joints or its tool_offset "

@@ -25,7 +25,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, separate_clearances
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents.problem_file import job_of
+from selfmotion.shell.documents.problem_file import plan_request_of
 from selfmotion.shell.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
@@ -186,11 +186,11 @@ def seam_job_of(
     file: FilePath,
     *,
     allow_code: bool = False,
-    memory: dict[str, Any] | None = None,
+    cache: dict[str, Any] | None = None,
 ) -> SeamJob:
     """Return the job that a document of a file describes. See `read_seam_job`.
 
-    Where many documents are read, those with the same arm share it by `memory`.
+    Where many documents are read, those with the same arm share it by `cache`.
     """
     given, settings = document.get("seams"), document.get("job", {})
     if isinstance(given, dict) and given.get("feed") == HIGHEST:
@@ -214,7 +214,7 @@ def seam_job_of(
             )
     if not isinstance(shared.get(NAME, {}), Mapping):
         raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
-    reader = _Reader(file, shared, allow_code, {} if memory is None else memory)
+    reader = _Reader(file, shared, allow_code, {} if cache is None else cache)
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first
@@ -258,9 +258,9 @@ class _Reader:
     """Reads the seams of a file, with what they share."""
 
     def __init__(
-        self, file: FilePath, shared: dict[str, Any], allow_code: bool, memory: dict[str, Any]
+        self, file: FilePath, shared: dict[str, Any], allow_code: bool, cache: dict[str, Any]
     ) -> None:
-        self._file, self._shared, self._code, self._memory = file, shared, allow_code, memory
+        self._file, self._shared, self._code, self._cache = file, shared, allow_code, cache
         # The arm and what all keep, read with any motion at all.
         self.first = self._read({"path": _ANY}, "seams")
         self._standing = standing(shared)
@@ -362,9 +362,9 @@ class _Reader:
         """Return the seams of a file; the same file is read once for many documents."""
         changed = table.stat().st_mtime_ns if is_file(table) else 0
         key = json.dumps(["seams", str(table), changed, options], default=str)
-        if key not in self._memory:
-            self._memory[key] = read_seams(table, options)
-        return self._memory[key]
+        if key not in self._cache:
+            self._cache[key] = read_seams(table, options)
+        return self._cache[key]
 
     def settings(self, given: Any) -> dict[str, Any]:
         """Return the settings of [job]."""
@@ -416,7 +416,7 @@ class _Reader:
     def _read(self, own: Mapping[str, Any], where: str) -> PlanRequest:
         document = {**self._shared, **own}
         try:
-            return job_of(document, self._file, allow_code=self._code, memory=self._memory)
+            return plan_request_of(document, self._file, allow_code=self._code, cache=self._cache)
         except SelfmotionError as error:
             text = str(error).removeprefix(f"{self._file}: ")
             raise FileFormatError(f"{self._file}: {where}: {text}") from error

@@ -7,24 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
-from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay import links, scene, three
+from selfmotion.shell.replay.facts import facts, table
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
     ClearanceCurve,
     Curves,
     KeyFrames,
     SelfMotion,
-    clearance_curve,
-    curves,
     key_frames,
-    self_motion,
     torque_limits,
 )
-from selfmotion.shell.replay.redundancy import SeamMaps, maps_of, packed_maps, tree
-from selfmotion.shell.replay.whole import Whole, describe, table
+from selfmotion.shell.replay.redundancy import SeamMaps, packed_maps, tree
+from selfmotion.shell.replay.replayed import Replayed, ToolTip
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [
@@ -40,85 +36,52 @@ _PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
 
 # Sizes of what is drawn, relative to half the diagonal of the scene.
 _TRACE_RADIUS = 0.005
-# Thickness of moves relative to seams.
-_THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 _FRAME_LENGTH = 0.12
 # Obstacles larger than this multiple of the scene, such as floors, do not enlarge the first view.
 _MAX_OBSTACLE_SIZE = 2.0
-# Points of the curves of a brief page.
-_BRIEF_POINTS = 101
-
-
-class _Tip:
-    """The motion of one tool tip, sampled: actual and prescribed positions, and the carrier."""
-
-    def __init__(
-        self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None, few: dict[str, int]
-    ) -> None:
-        self.carrier = follow.chain.carrier
-        points = few if whole is None else {"points": whole.points}
-        self.shown = curves(plan, plan.trajectory, follow, **points)
-        self.start = self.shown
-        if plan.initial_trajectory is not plan.trajectory:
-            self.start = curves(plan, plan.initial_trajectory, follow, **few)
-        # The whole path, also where the motion ends before it.
-        times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
-        base = follow.chain.base_placement
-        prescribed = follow.path.samples(times).translation
-        self.target: Array = prescribed @ base.rotation.T + base.translation
-
-    @property
-    def outline(self) -> list[Array]:
-        """Points of it in world axes; a path that is carried moves with the tool."""
-        fixed = [self.target] if self.carrier < 0 else []
-        return [self.shown.tool_in_world, *fixed]
 
 
 class _Motion:
-    """A plan, sampled: the motion itself and the minimum-norm motion."""
+    """What is replayed, sampled: the motion itself and the minimum-norm motion."""
 
     def __init__(
-        self, plan: Plan, whole: Whole | None, *, brief: bool = False, with_map: bool = True
+        self, replayed: Replayed, *, brief: bool = False, maps: Sequence[SeamMaps] = ()
     ) -> None:
-        robot = plan.robot
-        self.plan, self.whole = plan, whole
-        self.maps = maps_of(plan, whole) if with_map else []
-        self.frames = key_frames(robot, plan.trajectory)
+        plan = replayed.plan
+        self.replayed, self.plan, self.maps = replayed, plan, maps
+        self.frames = key_frames(plan.robot, plan.trajectory)
         is_minimum_norm = plan.initial_trajectory is plan.trajectory
-        self.ghost = self.frames if is_minimum_norm else key_frames(robot, plan.initial_trajectory)
-        few = {"points": _BRIEF_POINTS} if brief else {}
-        self.tips = [_Tip(plan, item, whole, few) for item in plan.problem.follows.items]
+        self.ghost = (
+            self.frames if is_minimum_norm else key_frames(plan.robot, plan.initial_trajectory)
+        )
+        points = replayed.points(brief=brief)
+        self.tips = [ToolTip(plan, item, points) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
-        self.obstacles = plan.obstacles if whole is None else whole.obstacles
-        models = [model for model, _ in plan.problem.envelope.bodies]
-        grows = whole is not None and whole.grows
         # Largest required distance of bodies [m].
         self.required_distance = max(
             (item.distance for item in plan.problem.clearances), default=0.0
         )
-        self.clearance = None if grows or brief else clearance_curve(plan.trajectory, models)
-        self.self_motion = None if whole or brief else self_motion(plan.problem, plan.trajectory)
+        self.clearance = None if brief else replayed.clearance()
+        self.self_motion = None if brief else replayed.self_motion()
 
 
 def page_content(
-    plans: list[Plan],
+    replayed: Sequence[Replayed],
     names: list[str],
     payload: Payload,
     *,
     triads: int | npt.ArrayLike,
-    whole: Whole | None = None,
     with_map: bool = True,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
 
-    `whole` is the job or the parts whose motion the one plan has; maps, which take seconds, may be
-    left out.
+    Maps, which take seconds, may be left out.
     """
-    robot = plans[0].robot
+    robot = replayed[0].plan.robot
     arm = links.bake(robot, payload)
-    motions = [_Motion(plan, whole, with_map=with_map) for plan in plans]
+    motions = [_Motion(item, maps=item.maps() if with_map else ()) for item in replayed]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -129,7 +92,7 @@ def page_content(
     around = [
         corners
         for motion in motions
-        for corners in scene.outlines(motion.obstacles, _MAX_OBSTACLE_SIZE * box.radius)
+        for corners in scene.outlines(motion.replayed.obstacles, _MAX_OBSTACLE_SIZE * box.radius)
     ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
@@ -145,7 +108,7 @@ def page_content(
             *scene.body_commands(robot, payload),
         ],
         "meshes": arm.meshes,
-        "joints": _joints(plans[0]),
+        "joints": _joints(replayed[0].plan),
         "tree": tree(robot, payload),
         # What is drawn moves with the model's joints: those that mimic others are among them.
         "movers": [links.joint_name(robot, k) for k in range(robot.model.nv)],
@@ -158,18 +121,16 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": [*_missing(arm, len(plans)), *_facts(plans, whole)],
+        "table": [*_missing(arm, len(replayed)), *table([item.facts for item in replayed])],
     }
 
 
 def plan_content(
-    plan: Plan,
+    replayed: Replayed,
     name: str,
     payload: Payload,
     *,
     radius: float,
-    triads: int,
-    whole: Whole | None = None,
     brief: bool = False,
     maps: Sequence[SeamMaps] = (),
     beside: Plan | None = None,
@@ -179,8 +140,7 @@ def plan_content(
     With the redundancy maps that are given; a `brief` one without distances and self-motions. The
     ghost is the plan `beside` where there is one, and the table has both.
     """
-    motion = _Motion(plan, whole, brief=brief, with_map=False)
-    motion.maps += maps
+    motion = _Motion(replayed, brief=brief, maps=maps)
     if beside is not None:
         motion.ghost = key_frames(beside.robot, beside.trajectory)
     scale = _scale([motion])
@@ -189,30 +149,25 @@ def plan_content(
     return {
         "scale": {**scale, "colors": three.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * radius / longest,
-        "joints": _joints(plan),
-        "plans": [_plan(motion, name, root, payload, scale, triads, radius)],
-        "table": _facts([plan], whole) if beside is None else _compared(plan, beside),
+        "joints": _joints(replayed.plan),
+        "plans": [_plan(motion, name, root, payload, scale, replayed.triads, radius)],
+        "table": table([replayed.facts]) if beside is None else _compared(replayed.plan, beside),
     }
 
 
 def _layers(motions: list[_Motion]) -> list[Json]:
-    """Return what can be shown and hidden; of several steps there is no minimum-norm motion."""
-    kept = [item for item in _LAYERS if item["name"] != "ghost" or motions[0].whole is None]
+    """Return what can be shown and hidden."""
+    has_ghost = motions[0].replayed.has_minimum_norm_motion
+    kept = [item for item in _LAYERS if item["name"] != "ghost" or has_ghost]
     has_bodies = motions[0].plan.robot.urdf.has_collisions
     bodies = [_BODIES_LAYER] if has_bodies else []
     pair = [_PAIR_LAYER] if any(motion.clearance for motion in motions) else []
     return [*kept, *bodies, *pair]
 
 
-def _facts(plans: list[Plan], whole: Whole | None) -> list[Json]:
-    if whole is None:
-        return table(plans)
-    return [{"label": label, "cells": [cell]} for label, cell in whole.facts.items()]
-
-
 def _compared(plan: Plan, beside: Plan) -> list[Json]:
     """Return the rows of two plans, both with the cost that the first one has to have least of."""
-    rows = table([plan, beside])
+    rows = table([facts(plan), facts(beside)])
     cost = sum(beside.evaluate(item) for item in plan.problem.costs)
     for row in rows:
         if row["label"] == "cost":
@@ -247,7 +202,8 @@ def _plan(
     size: float,
 ) -> Json:
     """Return what a page needs of one plan, its traces below the node `root`."""
-    shown, whole = motion.shown, motion.whole
+    shown, replayed = motion.shown, motion.replayed
+    obstacles = replayed.obstacles
     times = (
         np.linspace(0.0, shown.t[-1], triads)
         if isinstance(triads, int)
@@ -255,20 +211,20 @@ def _plan(
     )
     return {
         "label": name,
-        "description": describe(motion.plan) if whole is None else whole.description,
-        "steps": [] if whole is None else whole.steps(),
-        "events": [] if whole is None else whole.happenings(),
+        "description": replayed.description,
+        "steps": replayed.steps(),
+        "events": replayed.events(),
         "root": root,
         "tips": [
             *(
                 {"root": f"{root}/tip{f}", "carrier": tip.carrier}
                 for f, tip in enumerate(motion.tips)
             ),
-            *([] if whole is None else [{"root": f"{root}/moves", "carrier": -1}]),
+            *({"root": node, "carrier": -1} for node in replayed.nodes_in_world(root)),
         ],
         "duration": motion.plan.trajectory.duration,
-        "verdict": motion.plan.certificate.verdict if whole is None else whole.verdict,
-        "verified": bool((motion.plan.certificate if whole is None else whole).verified),
+        "verdict": replayed.verdict,
+        "verified": bool(replayed.verified),
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "selfMotion": _self_motion(motion.self_motion, payload),
@@ -283,39 +239,24 @@ def _plan(
         "clearance": None
         if motion.clearance is None
         else _clearance(motion.clearance, payload) | {"asked": motion.required_distance},
-        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
-        "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
+        "obstacles": {item.name: scene.obstacle_node(root, item) for item in obstacles},
+        "riders": scene.riders(root, motion.plan.robot, obstacles),
         "commands": [
-            *scene.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
+            *scene.obstacle_commands(root, motion.plan.robot, obstacles, payload),
             *(
                 command
                 for f, tip in enumerate(motion.tips)
-                for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size, whole)
+                for command in (
+                    *replayed.trace_commands(
+                        f"{root}/tip{f}", payload, tip, scale, _TRACE_RADIUS * size
+                    ),
+                    scene.triad_command(
+                        f"{root}/tip{f}", payload, tip.shown, times, _TRIAD_LENGTH * size
+                    ),
+                )
             ),
         ],
     }
-
-
-def _traces(
-    root: str,
-    payload: Payload,
-    tip: _Tip,
-    scale: Json,
-    times: Array,
-    size: float,
-    whole: Whole | None,
-) -> list[Json]:
-    """Return the commands for the traces of a tip, below the node `root` of what carries them.
-
-    Of a whole the seams are where they are carried, and the moves in the world beside it.
-    """
-    radius = _TRACE_RADIUS * size
-    axes = scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size)
-    if whole is None:
-        traces = (tip.shown, tip.start, tip.target, scale, radius)
-        return [*scene.trace_commands(root, payload, *traces), axes]
-    moves = f"{root.rsplit('/', 1)[0]}/moves"
-    return [*whole.commands(root, moves, payload, tip.shown, (radius, _THIN * radius)), axes]
 
 
 def _packed(frames: KeyFrames, payload: Payload) -> Json:

@@ -11,10 +11,10 @@ from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.content import page_content
 from selfmotion.shell.replay.meshes import Payload
 from selfmotion.shell.replay.page import joined, policy, squeezed, web
+from selfmotion.shell.replay.replayed import PlanReplay
 
 _VIEWER = "meshcat/viewer/dist/main.min.js"
 _SCRIPTS = ("payload.js", "meshcat.js")
-_TRIADS = 7
 
 
 def meshcat_html(plan: Plan, *, title: str | None = None) -> str:
@@ -36,7 +36,8 @@ def meshcat_html(plan: Plan, *, title: str | None = None) -> str:
     if not isinstance(plan, Plan):
         raise ProblemError(f"a page of meshcat is of {told(plan)}, expected a Plan")
     payload = Payload()
-    content = page_content([plan], ["plan"], payload, triads=_TRIADS)
+    replayed = PlanReplay(plan)
+    content = page_content([replayed], ["plan"], payload, triads=replayed.triads)
     code, script = _viewer_code(), joined(_SCRIPTS)
     return Template(web("meshcat.html")).substitute(
         policy=policy(script, code),

@@ -26,7 +26,7 @@ _TOLERANCE = 5e-5
 # Where a motion jumps, no interval is short enough; halving stops here [s].
 _SHORTEST = 1e-4
 # Points of each curve: one for every two or three pixels of a wide plot.
-_CURVE_POINTS = 401
+CURVE_POINTS = 401
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ def curves(
     plan: Plan,
     trajectory: Trajectory,
     follow: BoundTaskFrame | None = None,
-    points: int = _CURVE_POINTS,
+    points: int = CURVE_POINTS,
 ) -> Curves:
     """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots of what is followed."""
     follow = plan.problem.follows.items[0] if follow is None else follow

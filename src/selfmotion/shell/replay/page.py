@@ -28,13 +28,14 @@ from selfmotion.basics import (
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shell.replay.content import page_content
 from selfmotion.shell.replay.meshes import Json, Payload
+from selfmotion.shell.replay.replayed import PlanReplay, Replayed
+from selfmotion.shell.replay.sequence import SequenceReplay
 from selfmotion.shell.replay.still import still
-from selfmotion.shell.replay.whole import Whole, describe
 from selfmotion.work.job import Program
 
 # What a page can show.
 Shown = Plan | Sequence[Plan] | Program | Parts | Move
-_TRIADS, _MOST_TRIADS = 7, 1000
+_MOST_TRIADS = 1000
 # three.js, as `make three` takes it from its own package; the page's own scripts.
 _THREE = "three/three.min.js"
 _LIVE = ("handles.js", "live.js")
@@ -75,51 +76,47 @@ def replay_html(
     RobotError
         A visual of the robot cannot be read.
     """
-    whole = Whole.of(plans) if isinstance(plans, Program | Parts | Move) else None
-    shown = _as_list(plans if whole is None else whole.plan)
-    names = _labels(shown, labels)
-    payload = Payload()
-    content = page_content(
-        shown,
-        names,
-        payload,
-        triads=_TRIADS * (whole is None) if triads is None else _checked(triads),
-        whole=whole,
+    replayed: list[Replayed] = (
+        [SequenceReplay.of(plans)]
+        if isinstance(plans, Program | Parts | Move)
+        else [PlanReplay(plan) for plan in _as_list(plans)]
     )
-    obstacles = shown[0].obstacles if whole is None else whole.obstacles
-    seams = [] if whole is None else whole.seams()
-    picture = still(shown[0].robot, shown[0].trajectory, obstacles, content["camera"], seams)
+    first, names = replayed[0], _labels(len(replayed), labels)
+    payload = Payload()
+    axes = first.triads if triads is None else _checked(triads)
+    content = page_content(replayed, names, payload, triads=axes)
     if description is not None:
         for shown_plan in content["plans"]:
             shown_plan["description"] = description
-    if whole is not None:
-        heading = title or f"{shown[0].robot.name}, {type(plans).__name__.lower()}"
-        return _assemble(heading, description or whole.description, payload.pack(content), picture)
-    heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
-    sentences = [describe(plan) for plan in shown]
-    if len(shown) > 1:
+    sentences = [item.description for item in replayed]
+    if len(replayed) > 1:
         sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
+    what = f"{first.plan.task.value} task"
+    if isinstance(plans, Program | Parts | Move):
+        what = type(plans).__name__.lower()
+    heading = title or f"{first.plan.robot.name}, {what}"
+    picture = _still_of(first, content["camera"])
     return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
 
 
-def live_html(
-    plan: Plan, *, title: str, whole: Whole | None = None, live: Json
-) -> tuple[str, float]:
+def live_html(replayed: Replayed, *, title: str, live: Json) -> tuple[str, float]:
     """Return the page of a plan that is changed while it is shown, and the scene's radius [m].
 
     It is that of `replay_html` with the modules that a server is asked by: see `shell.view`, which
-    says in `live` what they have to know. `whole` is what the plan stands for, where it does.
+    says in `live` what they have to know.
     """
     payload = Payload()
-    triads = 0 if whole else _TRIADS
-    content = page_content([plan], ["plan"], payload, triads=triads, whole=whole, with_map=False)
-    obstacles = plan.obstacles if whole is None else whole.obstacles
-    seams = [] if whole is None else whole.seams()
-    picture = still(plan.robot, plan.trajectory, obstacles, content["camera"], seams)
+    content = page_content([replayed], ["plan"], payload, triads=replayed.triads, with_map=False)
     packed = payload.pack({**content, "live": live})
-    said = describe(plan) if whole is None else whole.description
-    page = _assemble(title, said, packed, picture, (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]))
+    scripts = (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1])
+    picture = _still_of(replayed, content["camera"])
+    page = _assemble(title, replayed.description, packed, picture, scripts)
     return page, float(content["radius"])
+
+
+def _still_of(replayed: Replayed, camera: Json) -> str:
+    plan = replayed.plan
+    return still(plan.robot, plan.trajectory, replayed.obstacles, camera, replayed.seams())
 
 
 def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
@@ -164,11 +161,11 @@ def _as_list(plans: Any) -> list[Plan]:
     return shown
 
 
-def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
+def _labels(count: int, labels: Sequence[str] | None) -> list[str]:
     if labels is None:
-        return ["plan"] if len(plans) == 1 else [f"Plan {chr(65 + k)}" for k in range(len(plans))]
-    if len(labels) != len(plans):
-        raise ProblemError(f"{len(labels)} labels for {len(plans)} plans; give one for each")
+        return ["plan"] if count == 1 else [f"Plan {chr(65 + k)}" for k in range(count)]
+    if len(labels) != count:
+        raise ProblemError(f"{len(labels)} labels for {count} plans; give one for each")
     for label in labels:
         if not isinstance(label, str):
             raise ProblemError(f"labels: {told(label)}, expected a text for each plan")

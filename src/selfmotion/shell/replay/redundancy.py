@@ -12,7 +12,6 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.redundancy import (
     COST_COLORS,
     LEGEND,
-    PIXELS,
     Reason,
     RedundancyMap,
     excess_cost,
@@ -20,7 +19,6 @@ from selfmotion.planning.redundancy import (
 )
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json, Payload
-from selfmotion.shell.replay.whole import Whole
 
 # Quantisation of joints: 16 bits of each joint's range, some 0.1 mrad.
 _JOINT_STEPS = 2**16 - 1
@@ -72,26 +70,18 @@ class SeamMaps:
     maps: tuple[RedundancyMap, ...]
 
 
-def maps_of(plan: Plan, whole: Whole | None) -> list[SeamMaps]:
-    """Return the maps for a page: of as many pixels as take about a second for a plan."""
-    if whole is None:
-        return [SeamMaps(0.0, "", slices(plan, PIXELS))]
-    if len(whole.plans) > MOST_SEAMS:
-        return []
-    return [SeamMaps(begin, name, slices(one, FEWER_PIXELS)) for begin, name, one in whole.plans]
-
-
 def slices(
     plan: Plan, most: Pixels, progress: Progress = silent, count: int = SLICES
 ) -> tuple[RedundancyMap, ...]:
-    """Return the first `count` slices of a plan, the other ones with fewer pixels."""
+    """Return the first `count` slices of a plan, of `most` pixels along either axis.
+
+    Those after the first one, and all where a body is not convex, have at most `FEWER_PIXELS`.
+    """
     are_convex = all(model.is_all_convex for model, _ in plan.problem.envelope.bodies)
-    first = most if are_convex else FEWER_PIXELS
+    fewer = (min(most[0], FEWER_PIXELS[0]), min(most[1], FEWER_PIXELS[1]))
     names = plan.redundancy_coordinates()[:count]
     return tuple(
-        plan.redundancy_map(
-            name, shape=first if k == 0 else min(first, FEWER_PIXELS), progress=progress
-        )
+        plan.redundancy_map(name, shape=most if k == 0 and are_convex else fewer, progress=progress)
         for k, name in enumerate(names)
     )
 

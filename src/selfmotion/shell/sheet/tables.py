@@ -9,7 +9,7 @@ from selfmotion.certificate import LIMIT_NAMES, Extreme, Finding
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Plan
-from selfmotion.shell.replay.whole import seam_color
+from selfmotion.shell.replay.sequence import seam_color
 from selfmotion.work.job import Program, Step
 from selfmotion.work.margins import Margins
 

@@ -7,7 +7,7 @@ from typing import Any
 from selfmotion.model.path import Path
 from selfmotion.planning.result import Parts, Plan
 from selfmotion.shell.replay.redundancy import SeamMaps
-from selfmotion.shell.replay.whole import Whole
+from selfmotion.shell.replay.replayed import Replayed
 from selfmotion.shell.view.floor import Floor
 from selfmotion.work.job import Program
 
@@ -41,13 +41,11 @@ class Found:
         A first motion; of a job a program in the order before; what is planned; no motion at all.
     words : str
         The verdict, or what stops it.
-    plan : Plan or None
-        None where the document describes no problem. Without a motion, the arm standing in its
-        place, along with what it has to follow. Of several seams what stands for them.
-    whole : Whole or None
-        Of several seams.
+    replayed : Replayed or None
+        A plan, or the steps of several seams; None where the document describes no problem.
+        Without a motion, the arm standing in its place, along with what it has to follow.
     made : Program, Parts or None
-        What that is of: a job's program, or a motion in parts.
+        What the steps are of: a job's program, or a motion in parts.
     unmade : tuple of Path
         Of a job the paths of the seams that are not made.
     maps : tuple of SeamMaps
@@ -61,8 +59,7 @@ class Found:
     request: Request
     kind: str
     words: str
-    plan: Plan | None
-    whole: Whole | None = None
+    replayed: Replayed | None
     made: Program | Parts | None = None
     unmade: tuple[Path, ...] = ()
     maps: tuple[SeamMaps, ...] = ()
@@ -72,9 +69,12 @@ class Found:
     @property
     def verified(self) -> bool:
         """Whether it is a motion that is verified."""
-        if self.whole is not None:
-            return self.whole.verified
-        return self.plan is not None and self.plan.certificate.verified
+        return self.replayed is not None and self.replayed.verified
+
+    @property
+    def plan(self) -> Plan | None:
+        """Its motion; of several seams a plan that stands for them."""
+        return None if self.replayed is None else self.replayed.plan
 
 
 class NewerRequest(BaseException):

@@ -24,9 +24,7 @@ def maps_soon(found: Found, progress: Progress) -> Iterator[SeamMaps]:
 
     Bodies that have to be far apart make each pixel take long: then there are fewer.
     """
-    plans = [] if found.plan is None else [(0.0, "", found.plan)]
-    if found.whole is not None:
-        plans = list(found.whole.plans)
+    plans = [] if found.replayed is None else list(found.replayed.plans)
     if len(plans) > MOST_SEAMS:
         return
     for begin, name, plan in plans:

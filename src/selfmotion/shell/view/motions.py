@@ -11,7 +11,7 @@ from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob
-from selfmotion.shell.replay.whole import Mark, Whole, stand_in, unproved
+from selfmotion.shell.replay.sequence import Mark, SequenceReplay, stand_in, unproved
 from selfmotion.work.job import Program, Step, backwards
 
 # Times of a coarse motion.
@@ -79,7 +79,7 @@ def _still(robot: RobotModel, q: Array, seconds: float) -> Trajectory:
 # The same of jobs.
 
 
-def coarse_program(job: SeamJob, before: Program) -> Whole:
+def coarse_program(job: SeamJob, before: Program) -> SequenceReplay:
     """Return a program put onto the paths of a job, seam by seam; moves are bent after it."""
     problems = dict(zip((seam.name for seam in job.seams), job.problems, strict=True))
     put, unreached = dict[int, Trajectory](), list[str]()
@@ -95,7 +95,7 @@ def coarse_program(job: SeamJob, before: Program) -> Whole:
     return _joined(before.steps, put, next(iter(problems.values())), words)
 
 
-def standing_program(job: SeamJob, last: Program | None, words: str) -> Whole:
+def standing_program(job: SeamJob, last: Program | None, words: str) -> SequenceReplay:
     """Return an arm that stands, for a job of which no seam has a motion."""
     robot, problem = job.robot, job.problems[0]
     known = list[Array]()
@@ -106,15 +106,15 @@ def standing_program(job: SeamJob, last: Program | None, words: str) -> Whole:
     return _unproved(problem, motion, (Mark(0.0, _GAP, "no motion", False),), words)
 
 
-def shown_program(program: Program) -> Whole:
+def shown_program(program: Program) -> SequenceReplay:
     """Return a program as a page shows it; moves that were not found are straight in joints."""
     if not any(step.is_missing for step in program.steps):
-        return Whole.of(program)
+        return SequenceReplay.of(program)
     problem = next(iter(program.plans.values())).problem
     return _joined(program.steps, {}, problem, program.verdict)
 
 
-def shown_as_written(program: Program, written: Sequence[Trajectory], words: str) -> Whole:
+def shown_as_written(program: Program, written: Sequence[Trajectory], words: str) -> SequenceReplay:
     """Return a program with the motions (one for each step) that a controller makes of it."""
     problem = next(iter(program.plans.values())).problem
     return _joined(program.steps, dict(enumerate(written)), problem, words)
@@ -122,7 +122,7 @@ def shown_as_written(program: Program, written: Sequence[Trajectory], words: str
 
 def _joined(
     steps: Sequence[Step], put: Mapping[int, Trajectory], problem: Problem, words: str
-) -> Whole:
+) -> SequenceReplay:
     """Return steps with some of their motions put elsewhere; moves are bent so that all meet.
 
     The bodies are those of a problem.
@@ -161,7 +161,9 @@ def _bent(share: Array, q: Array, ends: tuple[Array | None, Array | None]) -> Ar
     return np.asarray(q + np.outer(1.0 - share, first) + np.outer(share, last))
 
 
-def _unproved(problem: Problem, motion: Trajectory, marks: tuple[Mark, ...], words: str) -> Whole:
+def _unproved(
+    problem: Problem, motion: Trajectory, marks: tuple[Mark, ...], words: str
+) -> SequenceReplay:
     plan = stand_in(problem.robot, motion, problem.all_constraints)
     bodies = {body.name: body for item in problem.requirements for body in item.obstacles}
-    return Whole(plan, marks, words, False, (), tuple(bodies.values()), False)
+    return SequenceReplay(plan, marks, words, False, (), tuple(bodies.values()), False)

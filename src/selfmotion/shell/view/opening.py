@@ -5,13 +5,14 @@ from pathlib import Path
 
 from selfmotion.basics import ProblemError, SelfmotionError
 from selfmotion.planning.result import Parts, load_parts, load_plan
-from selfmotion.shell.documents import job_of
-from selfmotion.shell.replay.whole import Whole
+from selfmotion.shell.documents import plan_request_of
+from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay.sequence import SequenceReplay
 from selfmotion.shell.view.document import EditedPlan
+from selfmotion.shell.view.edit_session import EditSession
 from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.motions import shown_as_written, shown_program
-from selfmotion.shell.view.session import Session
-from selfmotion.shell.view.sitting import Sitting
+from selfmotion.shell.view.page_session import PageSession
 from selfmotion.shop import controllers
 from selfmotion.work.job import Program, load_program
 
@@ -21,7 +22,7 @@ _NOTHING = Request(0, {})
 _TOLD = 3
 
 
-def opened(file: Path, *, allow_code: bool = False, job: Path | None = None) -> Sitting:
+def opened(file: Path, *, allow_code: bool = False, job: Path | None = None) -> PageSession:
     """Return the page of a problem file, a job file, a plan, a program or a motion in parts.
 
     Plans, programs and parts are judged anew, as `selfmotion check` does.
@@ -55,42 +56,43 @@ def opened(file: Path, *, allow_code: bool = False, job: Path | None = None) -> 
         return _of_made(file, load_program(file))
     if file.suffix == ".parts":
         return _of_made(file, load_parts(file))
-    return Session(file, allow_code=allow_code)
+    return EditSession(file, allow_code=allow_code)
 
 
-def _of_plan(file: Path, allow_code: bool) -> Sitting:
+def _of_plan(file: Path, allow_code: bool) -> PageSession:
     plan = load_plan(file)
     try:
         edited = EditedPlan(file, plan)
-        job_of(edited.document, file, allow_code=allow_code)
+        plan_request_of(edited.document, file, allow_code=allow_code)
     except SelfmotionError as error:
         text = str(error).removeprefix(f"{file}: ")
-        sitting = Sitting(file, f"the plan is shown as it is, its problem is no file's: {text}")
-        sitting.open(Found(_NOTHING, "whole", plan.certificate.verdict, plan, is_brief=False))
-        return sitting
-    return Session(file, edited, allow_code=allow_code)
+        session = PageSession(file, f"the plan is shown as it is, its problem is no file's: {text}")
+        verdict = plan.certificate.verdict
+        session.open(Found(_NOTHING, "whole", verdict, PlanReplay(plan), is_brief=False))
+        return session
+    return EditSession(file, edited, allow_code=allow_code)
 
 
-def _of_written(file: Path, program: Program) -> Sitting:
+def _of_written(file: Path, program: Program) -> PageSession:
     """Return the page of a controller's program: as it is judged, and moves by its first way."""
     judged = controllers.judged_program(file, program)
     parts = controllers.parts_of(file, controllers.read_program(file, program.robot), program)
     wrong = [step for step in judged.steps if not step.verified]
     told = [f"'{step.name}': {step.verdict}" for step in wrong[:_TOLD]]
     words = "; ".join([judged.verdict, *told])
-    whole = shown_as_written(program, [ways[0] for ways in parts.motions], words)
-    whole = replace(whole, verified=judged.verified)
+    replayed = shown_as_written(program, [ways[0] for ways in parts.motions], words)
+    replayed = replace(replayed, verified=judged.verified)
     seams = program.plans
     unmade = tuple(seams[step.name].path for step in wrong if step.name in seams)
-    sitting = Sitting(file, f"{file.name} is shown as it is, and judged by its job")
-    sitting.open(Found(_NOTHING, "whole", words, whole.plan, whole, unmade=unmade, is_brief=False))
-    return sitting
+    session = PageSession(file, f"{file.name} is shown as it is, and judged by its job")
+    session.open(Found(_NOTHING, "whole", words, replayed, unmade=unmade, is_brief=False))
+    return session
 
 
-def _of_made(file: Path, made: Program | Parts) -> Sitting:
+def _of_made(file: Path, made: Program | Parts) -> PageSession:
     what = "the program" if isinstance(made, Program) else "the motion"
     source = "its job file" if isinstance(made, Program) else "its problem file"
-    sitting = Sitting(file, f"{what} is shown as it is; `selfmotion view` changes {source}")
-    whole = shown_program(made) if isinstance(made, Program) else Whole.of(made)
-    sitting.open(Found(_NOTHING, "whole", made.verdict, whole.plan, whole, made, is_brief=False))
-    return sitting
+    session = PageSession(file, f"{what} is shown as it is; `selfmotion view` changes {source}")
+    replayed = shown_program(made) if isinstance(made, Program) else SequenceReplay.of(made)
+    session.open(Found(_NOTHING, "whole", made.verdict, replayed, made, is_brief=False))
+    return session

@@ -18,7 +18,8 @@ from selfmotion.planning.optimise import Iteration
 from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, retime
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents import SeamJob, job_of, seam_job_of
+from selfmotion.shell.documents import SeamJob, plan_request_of, seam_job_of
+from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.found import Found, NewerRequest, Request
@@ -67,7 +68,7 @@ class Planning:
         self._wanted: Request | None = None
         self._change = threading.Condition()
         self._closed = False
-        self._memory: dict[str, Any] = {}
+        self._cache: dict[str, Any] = {}
         self._given = given
         # The places in reach, and what they are of; those of the request that is answered.
         self._places: tuple[Any, Floor | None] = None, None
@@ -125,8 +126,8 @@ class Planning:
 
     def answer(self, request: Request) -> Found:
         """Tell of the motions that are found for a request; return the last one."""
-        if len(self._memory) > _KEPT:
-            self._memory.clear()
+        if len(self._cache) > _KEPT:
+            self._cache.clear()
         answers = self._programs if is_job(request.document) else self._plans
         found = Found(request, "none", "", None)
         for found in answers(request):
@@ -150,8 +151,8 @@ class Planning:
     def _plans(self, request: Request) -> Iterator[Found]:
         """Yield what is found for a problem."""
         try:
-            job = job_of(
-                request.document, self._file, allow_code=self._allow_code, memory=self._memory
+            job = plan_request_of(
+                request.document, self._file, allow_code=self._allow_code, cache=self._cache
             )
             if job.goal not in GOALS:
                 raise ProblemError(
@@ -163,21 +164,22 @@ class Planning:
             return
         if self._given is not None and self._given[0] == request.document:
             self.last = found = self._given[1]
-            yield Found(request, "whole", found.certificate.verdict, found)
+            yield Found(request, "whole", found.certificate.verdict, PlanReplay(found))
             return
         first = self._coarse(job.problem)
         if first is not None:
-            begun = Found(request, "coarse", first.report.message, first)
+            begun = Found(request, "coarse", first.report.message, PlanReplay(first))
             yield from self._with_floor(begun, [job.problem], [first.trajectory.q])
         self._leave(request)
         try:
             found = self._whole(request, job)
         except SelfmotionError as error:
             words = f"not verified: {self._told(error)}"
-            yield Found(request, "none", words, standing(job.problem, self.last, words))
+            still = standing(job.problem, self.last, words)
+            yield Found(request, "none", words, PlanReplay(still))
             return
         self.last = found
-        yield Found(request, "whole", found.certificate.verdict, found)
+        yield Found(request, "whole", found.certificate.verdict, PlanReplay(found))
 
     def _programs(self, request: Request) -> Iterator[Found]:
         """Yield what is found for a job.
@@ -187,7 +189,7 @@ class Planning:
         """
         try:
             job = seam_job_of(
-                request.document, self._file, allow_code=self._allow_code, memory=self._memory
+                request.document, self._file, allow_code=self._allow_code, cache=self._cache
             )
         except SelfmotionError as error:
             yield Found(request, "none", self._told(error), None)
@@ -195,7 +197,7 @@ class Planning:
         before = self.last_program
         if before is not None and before.robot.joint_names == job.robot.joint_names:
             first = coarse_program(job, before)
-            begun = Found(request, "coarse", first.verdict, first.plan, first)
+            begun = Found(request, "coarse", first.verdict, first)
             near = {name: plan.trajectory.q for name, plan in before.plans.items()}
             known = [k for k, seam in enumerate(job.seams) if seam.name in near]
             problems = [job.problems[k] for k in known]
@@ -205,7 +207,7 @@ class Planning:
             if early is not None:
                 words = f"{early.verdict}; the best order is being looked for"
                 shown = shown_program(early)
-                yield Found(request, "early", words, shown.plan, shown, early)
+                yield Found(request, "early", words, shown, early)
                 self._leave(request)
         try:
             found = job.plan(progress=self._stage(request))
@@ -213,12 +215,12 @@ class Planning:
             words = f"not verified: {self._told(error)}"
             shown = standing_program(job, before, words)
             paths = tuple(seam.path for seam in job.seams)
-            yield Found(request, "none", words, shown.plan, shown, unmade=paths)
+            yield Found(request, "none", words, shown, unmade=paths)
             return
         self.last_program = found
         shown = shown_program(found)
         unmade = tuple(seam.path for seam in job.seams if seam.name in found.missing)
-        yield Found(request, "whole", found.verdict, shown.plan, shown, found, unmade)
+        yield Found(request, "whole", found.verdict, shown, found, unmade)
 
     def _with_floor(
         self, found: Found, problems: Sequence[Problem], near: Sequence[Array]

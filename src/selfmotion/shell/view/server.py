@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from selfmotion.basics import RenderError, SelfmotionError
-from selfmotion.shell.view.sitting import Sitting
+from selfmotion.shell.view.page_session import PageSession
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -45,7 +45,7 @@ def check_server() -> None:
 
 
 def serve(
-    session: Sitting,
+    session: PageSession,
     *,
     port: int = 0,
     opens: bool = True,
@@ -55,7 +55,7 @@ def serve(
 
     Parameters
     ----------
-    session : Sitting
+    session : PageSession
     port : int
         0 for a free one.
     opens : bool
@@ -117,7 +117,7 @@ def configuration(app: "Starlette") -> Any:
     )
 
 
-def application(session: Sitting, token: str, port: int) -> "Starlette":
+def application(session: PageSession, token: str, port: int) -> "Starlette":
     """Return the application: the page, its connection, exported files, and plans beside it."""
     from starlette.applications import Starlette
     from starlette.routing import Route, WebSocketRoute
@@ -137,13 +137,13 @@ class _Answers:
 
     Parameters
     ----------
-    session : Sitting
+    session : PageSession
     token : str
     port : int
         At which it is served.
     """
 
-    def __init__(self, session: Sitting, token: str, port: int) -> None:
+    def __init__(self, session: PageSession, token: str, port: int) -> None:
         self._session, self._token, self._port = session, token, port
         # Another name for this machine is one that a foreign page may have given it.
         names = (HOST, "localhost")
@@ -239,7 +239,7 @@ _HEADERS = {
 
 
 async def _both(
-    connection: "WebSocket", session: Sitting, outgoing: "asyncio.Queue[bytes]"
+    connection: "WebSocket", session: PageSession, outgoing: "asyncio.Queue[bytes]"
 ) -> None:
     """Hear and tell at the same time, until the page is closed."""
     hearing = asyncio.create_task(_hear(connection, session))
@@ -252,7 +252,7 @@ async def _both(
         task.result()
 
 
-async def _hear(connection: "WebSocket", session: Sitting) -> None:
+async def _hear(connection: "WebSocket", session: PageSession) -> None:
     from starlette.websockets import WebSocketDisconnect
 
     while True:

@@ -13,6 +13,7 @@ from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.content import plan_content
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.redundancy import tree
+from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.handles import PLAN, handles_of
 
@@ -21,7 +22,6 @@ from selfmotion.shell.view.handles import PLAN, handles_of
 STOPPED = f"{PLAN}/tip0/stopped"
 _RED = (0.80, 0.10, 0.08)
 _TUBE, _BALL, _POINTS = 0.007, 0.02, 201
-_TRIADS = 7
 
 
 class Shown:
@@ -50,15 +50,13 @@ class Shown:
             "beside": "" if beside is None else beside[0],
             **state,
         }
-        plan = found.plan
-        if plan is not None:
+        if found.replayed is not None:
+            plan = found.replayed.plan
             content |= plan_content(
-                plan,
+                found.replayed,
                 "plan",
                 payload,
                 radius=self._radius,
-                triads=_TRIADS if found.whole is None else 0,
-                whole=found.whole,
                 brief=found.is_brief,
                 maps=found.maps,
                 beside=None if beside is None else beside[1],
@@ -125,8 +123,8 @@ def _stopped(found: Found) -> Iterator[tuple[Path, float, list[float]]]:
         plans = made.plans if isinstance(made, Parts) else made.plans.values()
         for plan in plans:
             yield plan.path, plan.path.duration, _not_kept(plan)
-    elif found.plan is not None and found.whole is None:
-        plan = found.plan
+    elif isinstance(found.replayed, PlanReplay):
+        plan = found.replayed.plan
         stands = np.ptp(plan.trajectory.q, axis=0).max() == 0.0
         reached = 0.0 if stands else min(plan.trajectory.duration, plan.path.duration)
         yield plan.path, reached, [time for time in _not_kept(plan) if time <= reached]

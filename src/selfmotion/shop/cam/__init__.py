@@ -14,8 +14,10 @@ from selfmotion.shop.cam.path_files import (
     read_path as read_path,
     read_seams as read_seams,
 )
-from selfmotion.shop.cam.path_rows import (
+from selfmotion.shop.cam.pose_rows import (
     READING as READING,
     Reading as Reading,
+)
+from selfmotion.shop.cam.ros_messages import (
     nanoseconds as nanoseconds,
 )

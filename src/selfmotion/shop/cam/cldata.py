@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, lines_of
 from selfmotion.shop.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
-from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows
+from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows
 
 # Inch [m].
 _INCH = 25.4e-3
@@ -473,7 +473,7 @@ class _Reader:
         self._move_to(goal, tool, travels=self._rapid)
 
     def _compensate(self, given: list[str]) -> None:
-        if given[:1] not in (["OFF"], ["ON"]):
+        if given[:1] != ["OFF"]:
             self.machine.note(
                 f"CUTCOM/{','.join(given)}: places are taken as they are written, those of the "
                 f"tool's centre: no radius is added"

@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.model.path import from_normal
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # Largest size of a file [bytes].
 _MAX_FILE_SIZE = 200_000_000
@@ -189,7 +189,8 @@ class Machine:
         )
         siemens = own if self.file.suffix.lower() == _SIEMENS_SUFFIX else ""
         return self.fault(
-            f"{what} is not read: {siemens}page 'Files' of the docs lists what is (read_path)"
+            f"{what} is not read: {siemens}page 'Words of CAM files' of the docs lists what is "
+            f"(read_path)"
         )
 
     def note(self, what: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.shop.cam.cuts import Cut
 from selfmotion.shop.cam.drawn_curves import DRAWN
-from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows, no_such_seam
+from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows, no_such_seam
 
 # Names of entities and attributes: https://ezdxf.mozman.at/docs/.
 

@@ -29,7 +29,7 @@ from selfmotion.shop.cam.gcode_words import (
     values_of,
     words_of,
 )
-from selfmotion.shop.cam.path_rows import PoseRows, Reading
+from selfmotion.shop.cam.pose_rows import PoseRows, Reading
 from selfmotion.shop.cam.rotary import HEAD, Rotary
 
 # Inch [m].

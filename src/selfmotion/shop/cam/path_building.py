@@ -21,7 +21,7 @@ from selfmotion.model.path import (
     section_at_rest,
 )
 from selfmotion.shop.cam.cuts import RAPID
-from selfmotion.shop.cam.path_rows import CLDATA, DRAWING, PROGRAMS, PoseRows, selected_rows
+from selfmotion.shop.cam.pose_rows import CLDATA, DRAWING, PROGRAMS, PoseRows
 from selfmotion.shop.cam.tangents import AXES, sections_along, turning
 
 # Largest coordinate in metres [m]; one beyond can only be meant in millimetres.
@@ -452,7 +452,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, pacing: Pacing) -> tuple[Po
             chosen[-1] = k
     if len(chosen) in (1, count):
         return rows, rotations
-    return selected_rows(rows, chosen), rotations[chosen]
+    return rows.selected(chosen), rotations[chosen]
 
 
 def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, Any]) -> Feed:

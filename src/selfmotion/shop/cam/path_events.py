@@ -15,7 +15,7 @@ from selfmotion.model.path import (
     Waypoints,
     Weave,
 )
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # Length that counts as none [m].
 _NOTHING = 1e-9

@@ -20,32 +20,33 @@ from selfmotion.shop.cam.cldata import read_cldata
 from selfmotion.shop.cam.drawing import read_drawing
 from selfmotion.shop.cam.gcode import read_gcode
 from selfmotion.shop.cam.path_building import JUMP, Pacing, path_of_rows
-from selfmotion.shop.cam.path_rows import (
+from selfmotion.shop.cam.peers import peer_table
+from selfmotion.shop.cam.pose_lists import read_poses
+from selfmotion.shop.cam.pose_rows import (
+    ARRAY,
     CLDATA,
     DRAWING,
     PROGRAMS,
-    READERS,
     READING,
     TABLES,
     PoseRows,
     Reading,
     no_such_seam,
 )
-from selfmotion.shop.cam.peers import peer_table
-from selfmotion.shop.cam.pose_lists import READ
+from selfmotion.shop.cam.pose_tables import read_array, read_tables
 
 
 def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     """Return the poses of a table in the form of another program, or by its header."""
     peers = None if reading.columns else peer_table(file)
-    return READERS[file.suffix.lower()](file, reading) if peers is None else peers
+    return read_tables(file, reading) if peers is None else peers
 
 
 # Suffix → reader of the poses of each seam.
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
-    **READERS,
     **dict.fromkeys(TABLES, _read_table),
-    **READ,
+    ARRAY: lambda file, reading: {"": read_array(file, reading)},
+    **dict.fromkeys((".yaml", ".yml", ".json"), lambda file, _: read_poses(file)),
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
 }

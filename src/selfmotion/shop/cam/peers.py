@@ -14,7 +14,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, is_number, lines_of, number_in, shown, text_of
 from selfmotion.shop.cam.cuts import Machine, arc_points
-from selfmotion.shop.cam.path_rows import PoseRows
+from selfmotion.shop.cam.pose_rows import PoseRows
 
 # Millimetre [m].
 _MM = 1e-3

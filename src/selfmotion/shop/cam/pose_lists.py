@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -11,15 +11,10 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import FileFormatError, is_number, read_values, shown
-from selfmotion.shop.cam.path_rows import (
-    MATRIX_NOTE,
-    READERS,
-    PoseRows,
-    Reading,
-    column_name,
-    rows_of_table,
-)
 from selfmotion.shop.cam.peers import compas_poses
+from selfmotion.shop.cam.pose_rows import PoseRows
+from selfmotion.shop.cam.pose_tables import MATRIX_NOTE, column_name, rows_of_table
+from selfmotion.shop.cam.ros_messages import poses_of_messages
 
 # Names of lists of poses.
 _LISTS = ("poses", "waypoints", "points", "frames", "targets", "path")
@@ -39,7 +34,6 @@ _ORDERS = {
 _TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
 # Largest number of keys that a note names.
 _MAX_LISTED = 6
-_WRITTEN = (".yaml", ".yml", ".json")
 # Keys that move nothing.
 _NAMES = frozenset(
     ("name", "label", "id", "index", "header", "stamp", "time_stamp", "frame_id", "child_frame_id")
@@ -48,7 +42,7 @@ _NAMES = frozenset(
 _MOVING = re.compile(r"units?|scale|offset|origin|transform|base|tool|tcp|frame|relative")
 
 
-def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+def read_poses(file: FilePath) -> Mapping[str, PoseRows]:
     """Return the poses of a message of ROS, or of a list or table of poses; see `read_path`.
 
     Raises
@@ -63,7 +57,7 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     beside = dict[str, Any]()
     found = _poses_in(document, beside)
     if found is None:
-        return READERS[file.suffix.lower()](file, reading)
+        return poses_of_messages(file, document)
     notes = _passed_over(file, "beside the poses", beside)
     labels, items = [label for label, _ in found], [item for _, item in found]
     if all(_is_matrix(item) for item in items):
@@ -134,11 +128,6 @@ def _passed_over(file: FilePath, where: str, values: Mapping[str, Any]) -> tuple
             )
     others = [f"'{key}'" for key in values if key not in _NAMES]
     return (f"{where}: passed over: {', '.join(others[:_MAX_LISTED])}",) if others else ()
-
-
-READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
-    _WRITTEN, read_poses
-)
 
 
 def _poses_in(document: Any, beside: dict[str, Any]) -> list[tuple[str, Any]] | None:

@@ -13,9 +13,9 @@ from selfmotion.shop.controllers.judged_programs import (
     stated_deviation as stated_deviation,
     switching_faults as switching_faults,
 )
-from selfmotion.shop.controllers.motion_tables import (
-    followers as followers,
-    without_followers as without_followers,
+from selfmotion.shop.controllers.mimic_joints import (
+    mimic_joints as mimic_joints,
+    without_mimic_joints as without_mimic_joints,
 )
 from selfmotion.shop.controllers.motions import (
     FORMS as FORMS,
@@ -58,4 +58,4 @@ from selfmotion.shop.controllers.thinning import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,
 )
-from selfmotion.shop.controllers.tool_frames import turned_base as turned_base
+from selfmotion.shop.controllers.work_objects import turned_base as turned_base

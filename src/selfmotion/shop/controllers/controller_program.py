@@ -24,7 +24,7 @@ from selfmotion.shop.controllers.segments import (
     deviation_of,
 )
 from selfmotion.shop.controllers.thinning import operations_of
-from selfmotion.shop.controllers.tool_frames import WORLD
+from selfmotion.shop.controllers.work_objects import WORLD
 from selfmotion.work.job import Program
 
 # Largest distance of a first pose that was taught anew from the axis target before [rad or m].
@@ -77,7 +77,7 @@ class ControllerProgram:
         Path tolerance that is certified for seams with a programmed feed; None if there are none.
     timed : tuple of str
         Why seams with a feed are programmed with times, each reason once.
-    approach : float
+    start_gap : float
         Joint distance of the slow move from the initial axis target to the first pose [rad or m].
     facts : ProgramFacts or None
         Preconditions that the header states, such as held joints and the flange; None for none.
@@ -95,7 +95,7 @@ class ControllerProgram:
     remark: str = ""
     within: Tolerance | None = None
     timed: tuple[str, ...] = ()
-    approach: float = 0.0
+    start_gap: float = 0.0
     facts: ProgramFacts | None = None
     load: Load | None = None
 
@@ -110,10 +110,10 @@ class ControllerProgram:
 
         With a shifted work object, a move to the shifted start is expected.
         """
-        if self.shift is not None or self.approach <= _MAX_START_GAP:
+        if self.shift is not None or self.start_gap <= _MAX_START_GAP:
             return ""
         return (
-            f"its first axis target is {self.approach:.3g} rad or m from where its first pose has "
+            f"its first axis target is {self.start_gap:.3g} rad or m from where its first pose has "
             f"the arm, and nothing has judged the way between: begin it where that pose is"
         )
 

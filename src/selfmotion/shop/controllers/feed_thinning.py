@@ -36,7 +36,8 @@ from selfmotion.shop.controllers.steps import (
 )
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import Operation, is_at_rest
-from selfmotion.shop.controllers.tool_frames import ToolFrames, carrier_in_reference
+from selfmotion.shop.controllers.tool_frames import ToolFrames
+from selfmotion.shop.controllers.work_objects import carrier_in_reference
 
 # Tolerances of free rotation and self-motion, tried in turn [rad or m]; 0: that of the joints.
 _FREE_TOLERANCES = (0.2, 0.02, 0.0)
@@ -248,7 +249,9 @@ class FeedSection(PoseSection):
             # A halved step may be too short for an arc: it is linear then.
             if arc is not None and arc.is_meant:
                 vias[k] = via
-        found, arrived = self.frames.solved(positions, quaternions, self._mixed(along.q[ends], q))
+        found, arrived = self.frames.inverse_kinematics(
+            positions, quaternions, self._mixed(along.q[ends], q)
+        )
         if not arrived.all():
             at = travel.when(along.travel[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")

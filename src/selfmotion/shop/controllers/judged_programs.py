@@ -26,7 +26,7 @@ from selfmotion.shop.controllers.program_steps import ProgramParts, parts_of
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.segments import PoseSegment
 from selfmotion.shop.controllers.thinning import constraints_of_lines, constraints_of_targets
-from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
+from selfmotion.shop.controllers.work_objects import WORLD, carrier_in_reference
 from selfmotion.work.job import Program, are_opposite
 
 # Rounding of times in files [s].

@@ -28,13 +28,13 @@ from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers import ros
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.motion_tables import (
-    keyframes,
-    of_tables,
+    motion_of_arrays,
     read_npz,
-    write_arrays,
-    write_columns,
-    write_lists,
+    write_json,
+    write_npz,
+    write_table,
 )
+from selfmotion.shop.controllers.mujoco_keyframes import keyframes
 from selfmotion.shop.controllers.program_draft import check_signals
 from selfmotion.shop.controllers.program_files import (
     PROGRAMS,
@@ -248,7 +248,7 @@ def read_motion(
             f".mcap (ROS bag), .src (KUKA), .mod (ABB) or .script (linear URScript)"
         )
     document = read_document(path)
-    read = of_tables if "t" in document else ros.trajectory
+    read = motion_of_arrays if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)
 
 
@@ -352,9 +352,9 @@ MESSAGES = ("ros", "moveit")
 STREAM = 125.0
 _Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]
 WRITERS: Mapping[str, _Writer] = {
-    "csv": write_columns,
-    "npz": write_arrays,
-    "json": write_lists,
+    "csv": write_table,
+    "npz": write_npz,
+    "json": write_json,
     "ros": _write_ros,
     "moveit": _write_moveit,
     "bag": _write_bag,

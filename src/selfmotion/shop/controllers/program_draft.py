@@ -36,7 +36,8 @@ from selfmotion.shop.controllers.targets import (
     segments_of,
 )
 from selfmotion.shop.controllers.thinning import Operation, Section, operations_of
-from selfmotion.shop.controllers.tool_frames import ToolFrames, frame_of_paths, own_joint
+from selfmotion.shop.controllers.tool_frames import ToolFrames, axis_inside_arm
+from selfmotion.shop.controllers.work_objects import frame_of_paths
 from selfmotion.work.job import Program, are_opposite
 
 
@@ -177,7 +178,7 @@ def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) ->
             f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
             f"(ProgramSettings(mass=…))"
         )
-    joint = own_joint(robot, axes_of(robot, settings)) if form == "krl" else ""
+    joint = axis_inside_arm(robot, axes_of(robot, settings)) if form == "krl" else ""
     if joint:
         raise ProblemError(
             f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "

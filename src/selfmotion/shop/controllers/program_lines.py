@@ -10,12 +10,16 @@ from selfmotion.basics import FileFormatError, lines_of, text_of
 _BYTES = 50_000_000
 # Longest line of such a file [characters].
 _LINE = 2000
-# Largest number in it, in any unit.
-_LARGEST = 1e7
+# Bound of all numbers in it, in any unit: 9E9, by which ABB says that an axis is absent, is below.
+_NUMBER_BOUND = 1e10
+# Largest coordinate or time in it [mm, degrees or s].
+_MAX_QUANTITY = 1e7
 # Characters that end lines in other programs; a controller's file has none.
 _STRANGE = re.compile("[\v\f\x1c-\x1e\x85\u2028\u2029]")
 # Beginning of comments that name events.
 _EVENT = "event: "
+# Longest text of a number [characters].
+_MAX_DIGITS = 40
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
 
 
@@ -70,22 +74,29 @@ class Lines:
         return FileFormatError(f"{self.file}: line {self.number}: {what}")
 
     def number_of(self, text: str) -> float:
-        """Return a number that controllers can hold."""
-        found = text.strip()
-        if not _NUMBER.fullmatch(found) or len(found) > 40 or not abs(float(found)) < 1e10:
-            raise self.fault(f"'{found[:40]}' is no number that is meant")
-        return float(found)
+        """Return the number that a text is, below 1e10 in size."""
+        digits = text.strip()
+        if not _NUMBER.fullmatch(digits) or len(digits) > _MAX_DIGITS:
+            raise self.fault(f"'{digits[:_MAX_DIGITS]}' is no number, such as -12.5 or 1E3")
+        value = float(digits)
+        if abs(value) >= _NUMBER_BOUND:
+            raise self.fault(f"number {digits} is too large, expected less than {_NUMBER_BOUND:g}")
+        return value
 
     def coordinate(self, text: str) -> float:
         """Return a coordinate in degrees or mm, as it is."""
         value = self.number_of(text)
-        if abs(value) > _LARGEST:
-            raise self.fault(f"coordinate {value:g} is beyond all that is meant")
+        if abs(value) > _MAX_QUANTITY:
+            raise self.fault(
+                f"coordinate {value:g} is too large, expected {_MAX_QUANTITY:g} at most"
+            )
         return value
 
     def duration(self, text: str) -> float:
         """Return a time [s] that is above 0."""
-        found = self.number_of(text)
-        if not 0.0 < found < _LARGEST:
-            raise self.fault(f"time is {found:g} s, expected a number above 0")
-        return found
+        value = self.number_of(text)
+        if not 0.0 < value <= _MAX_QUANTITY:
+            raise self.fault(
+                f"time is {value:g} s, expected a number above 0, {_MAX_QUANTITY:g} at most"
+            )
+        return value

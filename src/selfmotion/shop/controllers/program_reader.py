@@ -19,7 +19,7 @@ from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.program_texts import DURATION_HEADING
 from selfmotion.shop.controllers.segment_building import Pose, ProgramFrames, Row, SegmentBuilder
 from selfmotion.shop.controllers.statements import Language
-from selfmotion.shop.controllers.tool_frames import WORLD
+from selfmotion.shop.controllers.work_objects import WORLD
 
 # Relative error of accelerations by their few digits.
 _ROUNDED = 1e-2
@@ -177,7 +177,7 @@ class ProgramReader:
             next(iter(self.comments.texts("joint targets")), ""),
             self.comments.tolerance(),
             tuple(dict.fromkeys(self.comments.texts("times"))),
-            builder.approach,
+            builder.start_gap,
             self.comments.facts(),
             self.load,
         )

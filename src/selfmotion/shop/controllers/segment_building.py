@@ -193,7 +193,7 @@ class SegmentBuilder:
         Segments so far.
     at : (n,) or None
         Current configuration.
-    approach : float
+    start_gap : float
         Joint distance from the first axis target to the first pose [rad or m].
     """
 
@@ -202,7 +202,7 @@ class SegmentBuilder:
     frames: ToolFrames | None
     segments: list[Segment] = field(default_factory=list)
     at: Array | None = None
-    approach: float = 0.0
+    start_gap: float = 0.0
 
     def add(self, row: Row) -> None:
         """Add the segment of a row.
@@ -254,7 +254,7 @@ class SegmentBuilder:
         found = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
         segment = replace(found, is_slow=True)
         if not self.segments:
-            self.approach = float(np.abs(segment.q[-1] - before).max())
+            self.start_gap = float(np.abs(segment.q[-1] - before).max())
         if moves:
             self.segments.append(segment)
         self.at = segment.q[-1]
@@ -335,7 +335,7 @@ class SegmentBuilder:
     def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
         seeds = np.repeat(at[None], len(poses), axis=0)
         seeds[:, frames.external] = poses[:, 7:]
-        return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
+        return frames.inverse_kinematics(poses[:, :3], poses[:, 3:7], seeds)
 
     def _sequential(
         self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]

@@ -379,7 +379,7 @@ class PoseSegment(Segment):
     def joints(self, rows: Array, times: Array) -> Array:
         q = np.array(self.near(times))
         q[:, self.frames.external] = rows[:, 7:]
-        found, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], q)
+        found, arrived = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], q)
         return np.where(arrived[:, None], found, np.nan)[:, self.order]
 
 

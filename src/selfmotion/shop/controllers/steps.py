@@ -287,7 +287,7 @@ class StepSearch:
             return False
         near = np.array(self.along.q[part])
         near[:, self.frames.external] = rows[:, 7:]
-        q, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], near)
+        q, arrived = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], near)
         return bool(arrived.all() and np.abs(q - self.along.q[part]).max() <= free)
 
 

@@ -41,7 +41,7 @@ _SHORTEST = 4e-3
 _EVENLY = 5
 # … if no error exceeds this multiple of its tolerance.
 _MUCH = 9.0
-# Times at which the arm's regularity is evaluated, per interval between two samples.
+# Times at which the smallest singular value is evaluated, per interval between two samples.
 _FINER = 4
 # Step of the central differences for accelerations [s].
 _AROUND = 2e-3
@@ -90,7 +90,7 @@ class PoseSection(Section):
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         marks = np.concatenate([[self.first], inside, [self.last]])
         t = finer(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
-        far = _OF_POSES / np.maximum(self.frames.regularity(motion(t)), 1e-12)
+        far = _OF_POSES / np.maximum(self.frames.smallest_singular_values(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
             at = float(t[int(far.argmax())] - motion.t[0])
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
@@ -154,7 +154,9 @@ class PoseSection(Section):
         exact = motion(np.minimum(self.first + segment.t, self.last))
         positions, quaternions = self.rounding(*self.frames.tool_poses(exact))
         # External axes in their digits, the arm's joints as they follow.
-        q, arrived = self.frames.solved(positions, quaternions, self._mixed(exact, segment.q))
+        q, arrived = self.frames.inverse_kinematics(
+            positions, quaternions, self._mixed(exact, segment.q)
+        )
         if not arrived.all():
             at = float(t[int(np.argmin(arrived))])
             raise NotByPosesError(

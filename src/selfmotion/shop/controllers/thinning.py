@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, PlanError, ProblemError
 from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
 from selfmotion.model.motion import Trajectory
-from selfmotion.model.path import REST_SPEED as _REST, FeedKept, Path
+from selfmotion.model.path import REST_SPEED as _REST, FeedProfile, Path
 from selfmotion.model.robot import Chain
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Move, Parts, Plan
@@ -52,7 +52,7 @@ class Operation(NamedTuple):
     chains: tuple[Chain, ...]
     is_move: bool = False
     room: Tolerance | None = None
-    feeds: tuple[tuple[FeedKept, ...], ...] = ()
+    feeds: tuple[tuple[FeedProfile, ...], ...] = ()
     speeds: Array | None = None
     keeps: Callable[[Trajectory, Tolerance], bool] | None = None
     rotation_task: Task = Task.POSE

@@ -1,4 +1,4 @@
-"""Work objects in which controllers express tool poses, and inverse kinematics of such poses."""
+"""Tool poses in a program's work object from joints, and the joints of such poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,35 +6,25 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
-from selfmotion.model.path import Joined, Path, Placed
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.robot import Chain, RobotModel
-from selfmotion.model.task import SE3, Quaternion, log3, rotation_vectors, skews
+from selfmotion.model.task import SE3, Quaternion, rotation_vectors, skews
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_settings import (
     AXES,
-    OF_PATH,
     Axis,
     ProgramSettings,
     tool_from_flange,
 )
+from selfmotion.shop.controllers.work_objects import WORLD, WorkObject
 
-# Smallest angle between frames above rounding [rad].
-_ANGLE_TOLERANCE = 1e-6
-# Largest difference of equal frames [m, parts of quaternions].
-_FRAME_TOLERANCE = 1e-9
-
-# Distance of a work object that must be in another unit, as a multiple of the arm's reach.
-_FAR_IN_REACHES = 20.0
-
-# A controller expresses tool poses in a work object, which is fixed in the controller's base frame
-# or on an external axis that carries the part (a positioner). A tool pose and the external axes
-# determine the six joints of the arm near known ones. They are found by Newton's method, Δq = J⁻¹
-# [Δp; log(R_wanted Rᵀ)], with J the six columns of the arm's joints.
-
-# Name of the fixed frame, which is no link.
-WORLD = "world"
 _JOINTS = 6
+
+# Inverse kinematics of a controller: a tool pose and the external axes determine the six joints of
+# the arm near known ones, whatever the joints' limits are. Newton's method finds them for many
+# poses at once, Δq = J⁻¹ [Δp; log(R_wanted Rᵀ)], with J the six columns of the arm's joints. What
+# searches an arm's whole range for one pose is `RobotModel.inverse_kinematics`.
+
 # Largest number of Newton steps.
 _MAX_ITERATIONS = 20
 # Largest change of a joint in one step [rad or m].
@@ -47,16 +37,9 @@ _DAMPING = 1e-14
 _SOLVED = 1e-8
 
 
-def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
-    """Return the pose of a work object's carrier in the frame of paths; None if it moves."""
-    link = robot.urdf.root if carrier == WORLD else carrier
-    between = robot.chain_to(link, robot.reference)
-    return None if len(between.joints) else between.place(np.zeros(robot.dof))
-
-
 @dataclass(frozen=True, eq=False)
 class ToolFrames:
-    """A work object, its carrier, and the tool that moves in it.
+    """A program's work object and its tool: poses of the one in the other, and joints of poses.
 
     Attributes
     ----------
@@ -91,41 +74,10 @@ class ToolFrames:
         settings: ProgramSettings,
         path_frame: SE3 | None = None,
     ) -> "ToolFrames":
-        """Return the frames by the settings of a program.
-
-        `path_frame` is the pose of the path's frame in its carrier link, for a work object that is
-        the frame of the path.
-
-        Raises
-        ------
-        ProblemError
-            The work object rides on what carries the tool, or there is no such link.
-        """
-        given, tool = settings.work_object, tool_from_flange(robot, settings)
-        carrier, work = base_of(robot), SE3.Identity()
-        name, inside = carrier, SE3.Identity()
-        if given is None:
-            given = robot.reference or work
-        elif isinstance(given, SE3):
-            _check_near(robot, given)
-            name = "given"
-        elif given == OF_PATH:
-            given, inside = robot.reference or robot.urdf.root, path_frame or inside
-            name = OF_PATH
-        else:
-            _check_link(robot, given)
-            name = given
-        if isinstance(given, SE3):
-            work = SE3(given)
-        elif robot.carrier_of(given)[0] == 0:
-            name = given if name == carrier else name
-            base = robot.chain_to(given, None if carrier == WORLD else carrier)
-            work = base.place(np.zeros(robot.dof)) * inside
-        else:
-            name = given if name == carrier else name
-            carrier, work = given, inside
-            _check_beside(robot, given)
-        return cls(robot, tuple(axes), carrier, work, name, tool, tool)
+        """Return the frames by the settings of a program; `WorkObject.of` has the parameters."""
+        tool = tool_from_flange(robot, settings)
+        work_object = WorkObject.of(robot, settings.work_object, path_frame)
+        return cls(robot, tuple(axes), *work_object, tool, tool)
 
     @property
     def is_carried(self) -> bool:
@@ -158,7 +110,7 @@ class ToolFrames:
         if not set(arm.tolist()) <= set(carrying):
             # A tool that stands still, while the arm holds the part, has poses of another kind.
             return f"not all of A1 to A6 of {name} carry its tool"
-        between = own_joint(self.robot, self.axes)
+        between = axis_inside_arm(self.robot, self.axes)
         if between:
             return (
                 f"joint '{between}' is in the arm itself, so that its controller chooses the elbow "
@@ -175,12 +127,14 @@ class ToolFrames:
         """
         from scipy.spatial.transform import Rotation
 
-        _, rotations, translations = self._tool_along(q)
+        _, rotations, translations = self._jacobians_and_poses(q)
         rotation = np.asarray(self.work.rotation)
         positions = (translations - self.work.translation) @ rotation
         return positions, Rotation.from_matrix(rotation.T @ rotations).as_quat()
 
-    def solved(self, positions: Array, quaternions: Array, near: Array) -> tuple[Array, Flags]:
+    def inverse_kinematics(
+        self, positions: Array, quaternions: Array, near: Array
+    ) -> tuple[Array, Flags]:
         """Return joints (K, n) for tool poses by Newton's method, and whether it converged, (K,).
 
         From seeds `near` (K, n), whose external axes are kept.
@@ -192,7 +146,7 @@ class ToolFrames:
         wanted_rotations = rotation @ Rotation.from_quat(quaternions).as_matrix()
         q = np.array(near)
         for step_number in range(_MAX_ITERATIONS + 1):
-            jacobian, rotations, translations = self._tool_along(q)
+            jacobian, rotations, translations = self._jacobians_and_poses(q)
             turned = rotation_vectors(wanted_rotations @ rotations.transpose(0, 2, 1))
             residual = np.hstack([wanted - translations, turned])
             if step_number == _MAX_ITERATIONS or np.abs(residual).max() < _CONVERGED:
@@ -206,19 +160,19 @@ class ToolFrames:
         """Return rates of the tool in the work object (K, 6) as rates of the arm's joints."""
         rotation = np.asarray(self.work.rotation)
         turned = np.hstack([rates[:, :3] @ rotation.T, rates[:, 3:] @ rotation.T])
-        return self._rates(self._tool_along(q)[0], turned)
+        return self._rates(self._jacobians_and_poses(q)[0], turned)
 
-    def regularity(self, q: Array) -> Array:
-        """Return the smallest singular values of the arm's Jacobian, in m and rad, (K,).
+    def smallest_singular_values(self, q: Array) -> Array:
+        """Return the smallest singular value of the Jacobian of A1 to A6 at each q, (K,).
 
-        0 in a singular pose.
+        Its rows are in m and rad; it is 0 in a singular pose.
         """
-        own = self._tool_along(q)[0][:, :, self.arm]
-        return np.asarray(np.linalg.svd(own, compute_uv=False)[:, -1])
+        jacobian = self._jacobians_and_poses(q)[0][:, :, self.arm]
+        return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[:, -1])
 
     def speeds(self, q: Array, qd: Array) -> Array:
         """Return how fast the tool is in the work object at q and qd (K, n), (K,) [m/s]."""
-        moved = np.einsum("kcn,kn->kc", self._tool_along(q)[0][:, :3], qd)
+        moved = np.einsum("kcn,kn->kc", self._jacobians_and_poses(q)[0][:, :3], qd)
         return np.asarray(np.linalg.norm(moved, axis=1))
 
     @staticmethod
@@ -230,10 +184,11 @@ class ToolFrames:
         return found
 
     def _rates(self, jacobian: Array, rates: Array) -> Array:
-        own = jacobian[:, :, self.arm]
-        gram = own @ own.transpose(0, 2, 1) + _DAMPING * np.eye(6)
-        solved = np.linalg.solve(gram, rates[:, :, None])[:, :, 0]
-        return np.asarray(np.einsum("kji,kj->ki", own, solved))
+        """Return rates of the tool in the carrier's axes (K, 6) as rates of the arm's joints."""
+        jacobian = jacobian[:, :, self.arm]
+        gram = jacobian @ jacobian.transpose(0, 2, 1) + _DAMPING * np.eye(6)
+        multipliers = np.linalg.solve(gram, rates[:, :, None])[:, :, 0]
+        return np.asarray(np.einsum("kji,kj->ki", jacobian, multipliers))
 
     def rounded(self, rounding: Rounding) -> "ToolFrames":
         """Return the frames with work object and tool rounded as in files."""
@@ -247,7 +202,7 @@ class ToolFrames:
         work, tool = both
         return replace(self, work=work, tool=tool)
 
-    def _tool_along(self, q: Array) -> tuple[Array, Array, Array]:
+    def _jacobians_and_poses(self, q: Array) -> tuple[Array, Array, Array]:
         """Return Jacobians (K, 6, n) and poses of the program's tool in the carrier's frame."""
         jacobian, rotations, translations = self.chain.along(q)
         other = self.flange_to_tool.inverse() * self.tool
@@ -257,95 +212,9 @@ class ToolFrames:
         return moved, rotations @ np.asarray(other.rotation), translations + lever
 
 
-def own_joint(robot: RobotModel, axes: Sequence[Axis]) -> str:
+def axis_inside_arm(robot: RobotModel, axes: Sequence[Axis]) -> str:
     """Return the external axis between the first and the last of A1 to A6; "" for none."""
     carrying = robot.chain_to(robot.tool).joints.tolist()
     arm = [k for k, joint in enumerate(carrying) if axes[joint].name.startswith("A")]
     inside = carrying[arm[0] : arm[-1]] if arm else []
     return next((axes[joint].joint for joint in inside if axes[joint].name.startswith("E")), "")
-
-
-def base_of(robot: RobotModel) -> str:
-    """Return the controller's base frame: the link ``base``, or the world.
-
-    By the conventions of ROS-Industrial ``base`` is the controller's frame.
-    """
-    part = robot.tool.rpartition("/")[0]
-    link = f"{part}/base" if part else "base"
-    known = link in robot.urdf.links and robot.carrier_of(link)[0] == 0
-    return link if known else WORLD
-
-
-def turned_base(robot: RobotModel) -> str:
-    """Return how the controller's base is rotated from the root, in words; "" if it is not."""
-    base = base_of(robot)
-    if base == WORLD:
-        return ""
-    pose = robot.chain_to(base).place(np.zeros(robot.dof))
-    angle = float(np.linalg.norm(log3(pose.rotation)))
-    if angle < _ANGLE_TOLERANCE:
-        return ""
-    return (
-        f"work objects are counted in '{base}', the controller's frame, which is turned by "
-        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
-        f"{OF_PATH} is the frame of the path"
-    )
-
-
-def frame_of_paths(paths: Sequence[Path]) -> SE3:
-    """Return the frame that paths are given in, in the link that they ride on.
-
-    Raises
-    ------
-    ProblemError
-        They are given in several frames.
-    """
-    frames = [_placed(path) for path in paths] or [SE3.Identity()]
-    for frame in frames[1:]:
-        if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _FRAME_TOLERANCE:
-            raise ProblemError(
-                f"work_object '{OF_PATH}': paths are given in several frames, expected one; give "
-                f"the name of a link, or a pose"
-            )
-    return frames[0]
-
-
-def _placed(path: Path) -> SE3:
-    """Return the frame that a path is given in."""
-    if isinstance(path, Placed):
-        return path.frame * _placed(path.original)
-    if isinstance(path, Joined):
-        return frame_of_paths(path.pieces)
-    inner = getattr(path, "original", None)
-    return SE3.Identity() if inner is None else _placed(inner)
-
-
-def _check_near(robot: RobotModel, work: SE3) -> None:
-    """Raise ProblemError for a work object that the arm is far from reaching."""
-    far = float(np.linalg.norm(work.translation))
-    if far > _FAR_IN_REACHES * robot.reach:
-        raise ProblemError(
-            f"{robot.name}: the work object is {far:.4g} m away, but the arm reaches "
-            f"{robot.reach:.3g} m; in millimetres? It is in m (position_mm in files)"
-        )
-
-
-def _check_link(robot: RobotModel, link: str) -> None:
-    links = list(robot.urdf.links)
-    if link not in links:
-        raise ProblemError(
-            f"{robot.name}: work_object '{link}' is none of its links{nearest(link, links)}; "
-            f"expected one of {', '.join(links)}, '{OF_PATH}' (the frame of the path), or a pose"
-        )
-
-
-def _check_beside(robot: RobotModel, link: str) -> None:
-    """Refuse a link that moves with the arm, or with what carries it."""
-    own = set(robot.chain_to(link).joints.tolist())
-    both = own & set(robot.chain_to(robot.tool).joints.tolist())
-    if both:
-        joint = robot.joint_names[min(both)]
-        raise ProblemError(
-            f"{robot.name}: work_object '{link}' moves with joint '{joint}', which carries the "
-            f"tool as well; expected a link that stands still, or that another axis carries"
-        )

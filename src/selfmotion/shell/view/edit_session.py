@@ -14,8 +14,8 @@ from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.view.document import Edited, EditedPlan
 from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.handles import Handle, dragged, handles_of
+from selfmotion.shell.view.page_session import PageSession
 from selfmotion.shell.view.planning import Planning
-from selfmotion.shell.view.sitting import Sitting
 from selfmotion.shell.view.sliders import Slider, sliders_of
 
 # Largest deviation of a matrix that the page sends from a pose.
@@ -24,7 +24,7 @@ _RIGID = 1e-3
 _NO_REQUEST = -1
 
 
-class Session(Sitting):
+class EditSession(PageSession):
     """A document that is edited on a page, with the plan of its present state.
 
     Parameters

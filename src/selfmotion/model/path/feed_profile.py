@@ -17,8 +17,8 @@ _SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class FeedKept:
-    """One of the feeds of a `Feed`, compared with the speeds that the path reaches.
+class FeedProfile:
+    """One of the feeds of a `Feed`, and the speeds that the path reaches.
 
     The feed has to be reached everywhere but in run-up, run-down, rounded corners and turns on the
     spot, and at least once in each of its intervals.
@@ -33,15 +33,15 @@ class FeedKept:
         First and last times of the intervals with this feed [s].
     t, speeds : (K,)
         Sample times in these intervals [s], and the speed of the tool there [m/s].
-    lasts : (K,)
+    durations : (K,)
         Duration that each sample represents [s].
-    counts : (K,)
+    required : (K,)
         Whether the feed has to be reached at each sample.
     causes : (K,)
         What limits the speed at each sample, in words.
     path : Feed
         The original path with this feed, which has the speed between the samples.
-    own : (K,)
+    path_times : (K,)
         Times of the samples on that path [s].
     rows : (K,)
         Indices of the samples on that path; consecutive ones are neighbours.
@@ -52,11 +52,11 @@ class FeedKept:
     during: Array
     t: Array = field(repr=False)
     speeds: Array = field(repr=False)
-    lasts: Array = field(repr=False)
-    counts: Flags = field(repr=False)
+    durations: Array = field(repr=False)
+    required: Flags = field(repr=False)
     causes: tuple[str, ...] = field(repr=False)
     path: "Feed" = field(repr=False)
-    own: Array = field(repr=False)
+    path_times: Array = field(repr=False)
     rows: Ints = field(repr=False)
 
     @property
@@ -80,13 +80,13 @@ class FeedKept:
     @property
     def slower(self) -> float:
         """Duration for which the tool is too slow where the feed has to be reached [s]."""
-        slow = (self.speeds < (1.0 - self.within) * self.asked) & self.counts
-        return float(self.lasts @ slow)
+        slow = (self.speeds < (1.0 - self.within) * self.asked) & self.required
+        return float(self.durations @ slow)
 
     @property
     def held_by(self) -> str:
         """What limits the slowest speed, in words."""
-        return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
+        return self.causes[self._worst] if self.required[self._worst] else "run-up and run-down"
 
     def named(self, time: float, duration: float) -> str:
         """Return the feed in words, and its interval on a path near a time [s]."""
@@ -111,10 +111,10 @@ class FeedKept:
     def _worst(self) -> int:
         """Index of the sample with the slowest speed; see `slowest`."""
         chosen = []
-        for own in range(len(self.during)):
-            here = self._interval == own
-            if (self.counts & here).any():
-                chosen.append(int(np.argmin(np.where(self.counts & here, self.speeds, np.inf))))
+        for interval in range(len(self.during)):
+            here = self._interval == interval
+            if (self.required & here).any():
+                chosen.append(int(np.argmin(np.where(self.required & here, self.speeds, np.inf))))
             elif here.any():
                 # Too short to run up and down.
                 chosen.append(int(np.argmax(np.where(here, self.speeds, -np.inf))))
@@ -125,7 +125,7 @@ class FeedKept:
         """Index of each sample's interval, (K,)."""
         return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
 
-    def timed(self, when: Callable[[Array], Array]) -> "FeedKept":
+    def timed(self, when: Callable[[Array], Array]) -> "FeedProfile":
         """Return the same with other times, given by a function of these."""
         during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
         return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
@@ -137,32 +137,32 @@ class FeedKept:
         On `path`: (I, 2) [s], and (I,), true where it has to be reached at both ends.
         """
         order = np.argsort(self.rows)
-        rows, own, counts = self.rows[order], self.own[order], self.counts[order]
-        next_to = (np.diff(rows) == 1) & (np.diff(own) > 0.0)
-        ends = np.stack([own[:-1], own[1:]], axis=1)
-        return ends[next_to], (counts[:-1] & counts[1:])[next_to]
+        rows, times, required = self.rows[order], self.path_times[order], self.required[order]
+        are_neighbours = (np.diff(rows) == 1) & (np.diff(times) > 0.0)
+        ends = np.stack([times[:-1], times[1:]], axis=1)
+        return ends[are_neighbours], (required[:-1] & required[1:])[are_neighbours]
 
-    def later(self, seconds: float) -> "FeedKept":
+    def later(self, seconds: float) -> "FeedProfile":
         """Return the same, started later."""
         return self.timed(lambda t: t + seconds)
 
-    def between(self, first: float, last: float) -> "FeedKept | None":
+    def between(self, first: float, last: float) -> "FeedProfile | None":
         """Return it between two times [s]; None if the feed need not be reached there."""
-        found = self.where((self.t >= first) & (self.t <= last))
-        return found and replace(found, during=np.clip(found.during, first, last))
+        profile = self.where((self.t >= first) & (self.t <= last))
+        return profile and replace(profile, during=np.clip(profile.during, first, last))
 
-    def where(self, rows: Flags) -> "FeedKept | None":
+    def where(self, rows: Flags) -> "FeedProfile | None":
         """Return it at samples of a mask (K,); None if the feed need not be reached there.
 
         Intervals without a sample where it has to be are left out.
         """
         if rows.all():
             return self
-        counted = np.unique(self._interval[self.counts & rows])
-        if not len(counted):
+        intervals = np.unique(self._interval[self.required & rows])
+        if not len(intervals):
             return None
-        rows = rows & np.isin(self._interval, counted)
-        names = ("t", "speeds", "lasts", "counts", "own", "rows")
+        rows = rows & np.isin(self._interval, intervals)
+        names = ("t", "speeds", "durations", "required", "path_times", "rows")
         chosen = {name: getattr(self, name)[rows] for name in names}
         causes = tuple(np.array(self.causes)[rows].tolist())
-        return replace(self, during=self.during[counted], **chosen, causes=causes)
+        return replace(self, during=self.during[intervals], **chosen, causes=causes)

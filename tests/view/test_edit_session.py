@@ -8,7 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import FileFormatError, PlanError, ProblemError, RobotError
 from selfmotion.model.task import SE3
-from selfmotion.shell.view import Session
+from selfmotion.shell.view import EditSession
 from selfmotion.shell.view.found import Found, NewerRequest, Request
 from selfmotion.shell.view.motions import standing
 from selfmotion.shell.view.planning import Planning
@@ -187,7 +187,7 @@ def test_a_file_that_is_no_problem_is_told_at_once(tmp_path, said):
     file = tmp_path / "circle.toml"
     file.write_text(f"{said}\n" + CIRCLE.replace("[[costs]]", "[other]"))
     with pytest.raises((FileFormatError, ProblemError), match=said.split()[0]):
-        Session(file)
+        EditSession(file)
 
 
 def test_a_verified_plan_is_exported(page, tmp_path):
@@ -226,7 +226,7 @@ def test_what_is_no_problem_is_told_at_once(tmp_path, text, said):
     file = tmp_path / "circle.toml"
     file.write_text(text)
     with pytest.raises((FileFormatError, ProblemError), match=said):
-        Session(file)
+        EditSession(file)
 
 
 def test_a_problem_without_a_motion_has_a_page_to_change_it_on(tmp_path):

@@ -1,4 +1,4 @@
-"""One sitting at the page: what is shown, to whom, and what of it is exported."""
+"""One session at the page: what is shown, to whom, and what of it is exported."""
 
 import threading
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.planning.result import Parts, Plan, load_plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
+from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.shown import Shown
 from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion
@@ -31,7 +32,7 @@ _OF_PARTS = {".parts": "parts (.parts)", **_OF_MOTIONS}
 _OWN = (".npz", ".program", ".parts")
 
 
-class Sitting:
+class PageSession:
     """A page that shows what a file holds, and has nothing to be changed.
 
     Parameters
@@ -59,14 +60,12 @@ class Sitting:
         ProblemError
             That is nothing.
         """
-        if found.plan is None:
+        if found.replayed is None:
             raise ProblemError(f"{self.file}: {found.words}")
         self._found = found
         live = {"exports": list(self.exports.items()), "saves": self.saves, "why": self._why}
-        self._html, radius = live_html(
-            found.plan, title=self.file.name, whole=found.whole, live=live
-        )
-        self._shown.begin(radius, found.plan.robot)
+        self._html, radius = live_html(found.replayed, title=self.file.name, live=live)
+        self._shown.begin(radius, found.replayed.plan.robot)
 
     @property
     def found(self) -> Found | None:
@@ -87,7 +86,7 @@ class Sitting:
     def exports(self) -> dict[str, str]:
         """Files that the motion can be exported to: their suffixes, and how they are called."""
         found = self._found
-        if found is None or found.whole is None:
+        if found is None or found.replayed is None or isinstance(found.replayed, PlanReplay):
             return _OF_PLANS
         if found.made is None and not self.saves:
             # A motion of a controller's own program is there already.
@@ -161,9 +160,9 @@ class Sitting:
 
     def _check_beside(self, name: str, plan: Plan) -> None:
         found = self._found
-        if found is None or found.plan is None or found.whole is not None:
+        if found is None or not isinstance(found.replayed, PlanReplay):
             raise ProblemError(f"{name}: a plan is shown beside a plan, and here are several seams")
-        own = found.plan.robot
+        own = found.replayed.plan.robot
         if plan.robot.joint_names != own.joint_names or plan.robot.name != own.name:
             raise ProblemError(
                 f"{name}: is of '{plan.robot.name}', expected a plan of '{own.name}' with the same "

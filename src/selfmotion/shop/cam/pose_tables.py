@@ -1,0 +1,355 @@
+"""Tables and arrays of poses: the names, units and orientations of their columns."""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from selfmotion.basics import (
+    LEFT_OUT,
+    TURN,
+    Array,
+    FileFormatError,
+    nearest,
+    read_arrays,
+    read_rows,
+)
+from selfmotion.shop.cam.pose_rows import PoseRows, Reading
+
+_POSITION = ("x", "y", "z")
+# Column with the name of a row's seam.
+SEAM = "seam"
+# Column with the events at a row.
+EVENT = "event"
+# Columns of an orientation → its key in `ORIENTATIONS`.
+_ORIENTATIONS: Mapping[tuple[str, ...], str] = {
+    ("qw", "qx", "qy", "qz"): "quaternion",
+    ("rx", "ry", "rz"): "rotation_vector",
+    ("roll", "pitch", "yaw"): "rpy",
+    ("nx", "ny", "nz"): "normal",
+}
+_NAMES = {"t", "feed", *_POSITION, *(name for names in _ORIENTATIONS for name in names)}
+# Columns of a table without a header, by their number.
+_DEFAULT_HEADERS = {
+    3: "x,y,z",
+    4: "t,x,y,z",
+    6: "x,y,z,nx,ny,nz",
+    7: "x,y,z,qw,qx,qy,qz",
+    8: "t,x,y,z,qw,qx,qy,qz",
+}
+# Columns of an array, by their number, unless options name them.
+_ARRAY_COLUMNS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
+
+# Other spellings of names.
+
+# Units in brackets behind a title → what its name ends in.
+_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
+_BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
+_BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
+_TITLE_WITH_UNIT = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
+_SYNONYMS = {"time": "t", "timestamp": "t"}
+# Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
+_POSITION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
+_QUATERNION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
+# Columns of a frame of KUKA's → their names here.
+_KUKA_TITLES = {
+    "a": "yaw_deg",
+    "b": "pitch_deg",
+    "c": "roll_deg",
+    "x": "x_mm",
+    "y": "y_mm",
+    "z": "z_mm",
+}
+_KUKA_NOTE = (
+    "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
+    "where they say no unit"
+)
+# Names of orientations that are refused, by makers of controllers → their names here.
+_MAKERS_TITLES = {
+    **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+    **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
+    **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
+}
+# The first word of a program.
+_GCODE_WORD = re.compile(r"[gmn][0-9]+|%")
+# Names that are offered as spelling suggestions.
+_SUGGESTED = ("feed", "roll", "pitch", "yaw", SEAM, EVENT)
+
+# Units.
+
+# Ending of a name → the columns that may have it, and the unit [m]; None for degrees.
+_UNITS = {
+    "_mm": ((*_POSITION, "feed"), 1e-3),
+    "_cm": ((*_POSITION, "feed"), 1e-2),
+    "_in": ((*_POSITION, "feed"), 25.4e-3),
+    "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None),
+}
+_ROTATION_VECTOR = ("rx", "ry", "rz")
+# Columns without a unit → the unit that is taken, and the ending for another one.
+_DEFAULT_UNITS = {
+    "t": ("seconds", ""),
+    **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
+    "feed": ("m/s", "feed_mm"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), ("radians about fixed axes", "roll_deg")),
+    **dict.fromkeys(_ROTATION_VECTOR, ("radians", "rx_deg")),
+}
+_ROTATION_VECTOR_NOTE = (
+    "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
+)
+# Relative rounding that is allowed above half a turn.
+_HALF_TURN = 2e-4
+# Coordinate above which lengths are no metres: no arm reaches so far [m].
+_MAX_METRES = 10.0
+# Note on 4 x 4 matrices, which say no unit.
+MATRIX_NOTE = "matrices say no unit: their last columns are taken for metres"
+
+
+def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, PoseRows]:
+    """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
+    with_unit = set[str]()
+
+    def normalised(title: str) -> str:
+        """Return the column's name for a title, and record titles that state a unit."""
+        name = column_name(title)
+        if "[" in title or "(" in title:
+            with_unit.add(name)
+        return name
+
+    header, table, lines, texts = read_rows(
+        file,
+        (SEAM, EVENT),
+        check=lambda names: [_si_column(file, name) for name in _kuka_titles(names)],
+        columns=None if reading is None else reading.columns,
+        named=normalised,
+        usual=_DEFAULT_HEADERS,
+    )
+    labels = [f"line {number}" for number in lines]
+    whole = rows_of_table(file, header, table, labels, texts, with_unit)
+    if SEAM not in texts:
+        return {"": whole}
+    if not lines:
+        raise FileFormatError(f"{file}: has 0 poses, expected at least two")
+    names = texts[SEAM]
+    blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
+    if blank is not None:
+        raise FileFormatError(f"{file}: line {blank}: names no seam")
+    return {
+        name: whole.selected([k for k, other in enumerate(names) if other == name])
+        for name in dict.fromkeys(names)
+    }
+
+
+def rows_of_table(
+    file: FilePath,
+    header: Sequence[str],
+    table: Array,
+    labels: Sequence[str],
+    texts: Mapping[str, Sequence[str]],
+    with_unit: Collection[str] = (),
+) -> PoseRows:
+    """Return the poses of a table, from its columns of numbers and of texts.
+
+    Columns `with_unit` have a unit in the title, though not in their name.
+    """
+    notes: tuple[str, ...] = ()
+    if (titles := _kuka_titles(header)) != list(header):
+        _check_millimetres(file, header, table)
+        header, notes = titles, (_KUKA_NOTE,)
+    columns = _columns(file, header, table)
+    notes += _units_note([title for title in header if title not in with_unit])
+    events = texts.get(EVENT, [""] * len(labels))
+    missing = [name for name in _POSITION if name not in columns]
+    if missing:
+        raise FileFormatError(
+            f"{file}: column '{missing[0]}' is missing; the header is "
+            f"{','.join((*header, *texts))}, expected x,y,z [m] (or x_mm,…), t [s], and an "
+            f"orientation"
+        )
+    orientation, values, orientation_notes = _orientations(file, header, columns, labels)
+    return PoseRows(
+        labels,
+        np.stack([columns[name] for name in _POSITION], axis=1),
+        orientation,
+        values,
+        columns.get("t"),
+        columns.get("feed"),
+        tuple((k, event) for k, text in enumerate(events) for event in _split_events(text)),
+        notes=notes + orientation_notes,
+    )
+
+
+def _orientations(
+    file: FilePath, header: Sequence[str], columns: Mapping[str, Array], labels: Sequence[str]
+) -> tuple[str, Array, tuple[str, ...]]:
+    """Return which key of `ORIENTATIONS` a table has, "" for none, its values, and notes on it."""
+    present = [names for names in _ORIENTATIONS if set(names) & set(columns)]
+    if len(present) > 1:
+        raise FileFormatError(
+            f"{file}: has columns {','.join(present[0])} and {','.join(present[1])}; keep one "
+            f"orientation"
+        )
+    if not present:
+        return "", np.zeros((len(labels), 0)), ()
+    (names,) = present
+    missing = [name for name in names if name not in columns]
+    if missing:
+        raise FileFormatError(
+            f"{file}: column '{missing[0]}' is missing, expected {','.join(names)}"
+        )
+    values = np.stack([columns[name] for name in names], axis=1)
+    if names != _ROTATION_VECTOR:
+        return _ORIENTATIONS[names], values, ()
+    unit = "_deg" if any(column_name(title) == "rx_deg" for title in header) else ""
+    angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
+    _check_rotation_vectors(file, values, labels, angles)
+    note = f"{_ROTATION_VECTOR_NOTE}; angles about fixed axes are called {angles}"
+    return _ORIENTATIONS[names], values, (note,)
+
+
+def _units_note(titles: Sequence[str]) -> tuple[str, ...]:
+    """Return a note of columns that say no unit, and of what they are taken for."""
+    bare: dict[tuple[str, str], list[str]] = {}
+    for title in titles:
+        if column_name(title) in _DEFAULT_UNITS:
+            bare.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(column_name(title))
+    if not bare:
+        return ()
+    columns = "; ".join(
+        f"{','.join(names)} for {taken}{f' (else: {others})' if others else ''}"
+        for (taken, others), names in bare.items()
+    )
+    return (f"columns say no unit and are taken so: {columns}",)
+
+
+def _kuka_titles(titles: Sequence[str]) -> list[str]:
+    """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
+    given = [column_name(title) for title in titles]
+    return (
+        [_KUKA_TITLES.get(name, name) for name in given]
+        if {"a", "b", "c"} <= set(given)
+        else [*titles]
+    )
+
+
+def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
+    """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
+    bare = [k for k, title in enumerate(titles) if column_name(title) in _POSITION]
+    if bare and len(table) and np.abs(table[:, bare]).max() < _MAX_METRES:
+        raise FileFormatError(
+            f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
+            f"{_MAX_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
+            f"yaw_deg,pitch_deg,roll_deg"
+        )
+
+
+def _check_rotation_vectors(
+    file: FilePath, turns: Array, labels: Sequence[str], angles: str
+) -> None:
+    """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
+    sizes = np.linalg.norm(turns, axis=1)
+    # Degrees that are taken for radians are reported as such later on.
+    over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
+    if over.any():
+        k = int(np.argmax(over))
+        raise FileFormatError(
+            f"{file}: {labels[k]}: rx,ry,rz is an axis times an angle of "
+            f"{np.degrees(sizes[k]):.7g}°, more than half a turn; are these angles about fixed "
+            f"axes? Call them {angles}; of a rotation vector take the shorter turn, the other way "
+            f"round"
+        )
+
+
+def column_name(title: str) -> str:
+    """Return a title as its column is called here: x_mm of "X [mm]"."""
+    name = title.strip().lower()
+    found = _TITLE_WITH_UNIT.fullmatch(name)
+    if found and found[2].strip() in _BRACKETS:
+        name = found[1] + _BRACKETS[found[2].strip()]
+    stem, unit = name, ""
+    for suffix in _UNITS:
+        if name.endswith(suffix):
+            stem, unit = name.removesuffix(suffix), suffix
+    if position := _POSITION_TITLES.fullmatch(stem):
+        stem = position[1] or position[2]
+    elif turn := _QUATERNION_TITLES.fullmatch(stem):
+        stem = f"q{turn[1]}"
+    return _SYNONYMS.get(stem, stem) + unit
+
+
+def _split_events(text: str) -> list[str]:
+    """Return the events of a row, with semicolons between them."""
+    return [event.strip() for event in text.split(";") if event.strip()]
+
+
+def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without unit."""
+    columns: dict[str, Array] = {}
+    for k, title in enumerate(header):
+        name, scale = _si_column(file, title)
+        if name in columns:
+            raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
+        columns[name] = scale * table[:, k]
+    return columns
+
+
+def _si_column(file: FilePath, title: str) -> tuple[str, float]:
+    """Return the name of a column without its unit, and that in SI units."""
+    title = column_name(title)
+    name, scale = title, 1.0
+    for suffix, (names, factor) in _UNITS.items():
+        if title.endswith(suffix) and title.removesuffix(suffix) in names:
+            name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+    if name in ("i", "j", "k"):
+        raise FileFormatError(
+            f"{file}: column '{name}': of machines i,j,k points out of the part; nx,ny,nz is the "
+            f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
+            f"they point out"
+        )
+    if _GCODE_WORD.match(title):
+        raise FileFormatError(
+            f"{file}: unknown column '{title}': if this is G-code, call the file .nc or .gcode"
+        )
+    if name in _MAKERS_TITLES:
+        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS_TITLES[name]}")
+    if name not in _NAMES:
+        raise FileFormatError(
+            f"{file}: unknown column '{title}'{nearest(title, _SUGGESTED)}, expected "
+            f"t, feed, seam, event, x,y,z and "
+            f"{' or '.join(','.join(names) for names in _ORIENTATIONS)}; to leave a column out, "
+            f"call it - in columns (--columns -,x,y,z)"
+        )
+    return name, scale
+
+
+def read_array(file: FilePath, reading: Reading) -> PoseRows:
+    """Return the rows of an array (N, 4, 4) of poses, or of a table (N, C) of numbers."""
+    (array,) = read_arrays(file).values()
+    if array.dtype.kind not in "iuf":
+        raise FileFormatError(f"{file}: holds no array of numbers")
+    labels = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        rotations = array[:, :3, :3] * 1.0
+        rows = PoseRows(labels, array[:, :3, 3] * 1.0, "rotation", rotations, None)
+        return replace(rows, notes=(MATRIX_NOTE,))
+    if array.ndim != 2:
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or a table (N, C)"
+        )
+    columns = reading.columns or _ARRAY_COLUMNS.get(array.shape[1])
+    if columns is None and array.shape[1] in (7, 8):
+        before = "t," * (array.shape[1] == 8)
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, which does not say in which order quaternions are; "
+            f"give columns ('{before}x,y,z,qw,qx,qy,qz' or '{before}x,y,z,qx,qy,qz,qw')"
+        )
+    if columns is None or len(columns) != array.shape[1]:
+        count = "no columns" if columns is None else f"{len(columns)} columns"
+        raise FileFormatError(
+            f"{file}: has shape {array.shape} and {count} are named, expected (N, 4, 4) poses, "
+            f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
+        )
+    chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, chosen] * 1.0
+    return rows_of_table(file, [columns[k] for k in chosen], numbers, labels, {})
