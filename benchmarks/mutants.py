@@ -201,8 +201,7 @@ PARTS = (
     Part(
         "programs read",
         (
-            "shop/controllers/read_*.py",
-            "shop/controllers/program_reader.py",
+            "shop/controllers/*_reader.py",
             "shop/controllers/program_comments.py",
             "shop/controllers/program_lines.py",
             "shop/controllers/statements.py",
