@@ -82,6 +82,14 @@ def test_a_bound_that_holds_is_followed() -> None:
     assert planned(found)[:, 0].max() <= search._DIFFERENCE * (1.0 + ROUNDING)
 
 
+def test_a_bound_that_holds_takes_nothing_from_a_step() -> None:
+    """However little the cost falls outwards: the whole length is for what can move."""
+    found, begun = descent(lambda place: float(BOX.share(place) @ [-0.9, -0.5]), (1.0, 0.0))
+    found.run(begun)
+    # After the place itself and one difference for each coordinate.
+    np.testing.assert_allclose(planned(found)[3], [1.0, search._LONGEST], atol=ROUNDING)
+
+
 def test_no_step_is_longer_than_the_longest() -> None:
     found, begun = descent(lambda place: float(BOX.share(place) @ [-3.0, -4.0]), (0.0, 0.0))
     assert found.run(begun).cost < begun.cost
@@ -104,3 +112,37 @@ def test_a_step_that_does_not_gain_is_halved() -> None:
     assert better is not None
     assert better.cost < begun.cost
     assert found._along(begun, np.array([0.1, 0.5]), np.array([-0.1, 0.0])) is None
+
+
+def test_a_step_that_gains_at_an_eighth_of_its_length_is_found() -> None:
+    """And none below that."""
+
+    def walled(place: Array) -> float:
+        share = float(BOX.share(place)[0])
+        return 9.0 if share > edge else 1.0 - share
+
+    for part, is_found in ((8.0, True), (16.0, False)):
+        edge = 1.01 * search._LONGEST / part
+        found, begun = descent(walled, (0.0, 0.5))
+        better = found._along(begun, np.array([0.0, 0.5]), np.array([search._LONGEST, 0.0]))
+        assert (better is not None) is is_found
+
+
+def test_beginnings_are_the_same_each_time_and_all_over_the_box() -> None:
+    """Each quarter of the box has as many; more of them are others."""
+    first, again, more = (search.beginnings(BOX, *which) for which in ((0, 15), (0, 15), (15, 31)))
+    np.testing.assert_array_equal(first, again)
+    assert not {place.tobytes() for place in first} & {place.tobytes() for place in more}
+    shares = np.array([BOX.share(place) for place in [*first, *more]])
+    assert shares.min() >= 0.0
+    assert shares.max() < 1.0
+    quarters = 2 * (shares[:, 0] >= 0.5) + (shares[:, 1] >= 0.5)
+    # The corner is left out.
+    assert sorted(np.bincount(quarters).tolist()) == [7, 8, 8, 8]
+
+
+def test_a_box_holds_its_ends_and_nothing_beyond() -> None:
+    for share in ((0.0, 0.0), (1.0, 0.5), (1.0, 1.0)):
+        assert BOX.holds(BOX.at(np.array(share)))
+    for share in ((-0.01, 0.5), (0.5, 1.01)):
+        assert not BOX.holds(BOX.at(np.array(share)))
