@@ -186,6 +186,7 @@ PARTS = (
             "basics/test_series.py",
             "robot/test_chain_series.py",
             "motion/test_polynomials.py",
+            "motion/test_spline.py",
             "path/test_series.py",
             "certificate/test_bounds_hold.py",
             "certificate/test_made_to_deceive.py",
