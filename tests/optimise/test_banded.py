@@ -85,7 +85,7 @@ STEEP_GAP = 1e-3
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("count", [300, 1000])
+@pytest.mark.parametrize("count", [200, 300, 1000])
 def test_steep_rows_next_to_others_are_no_obstacle(seed: int, count: int) -> None:
     gradient, rows = uneven_splines(seed, count)
     none, most = np.zeros(count + 2), np.full(count + 2, 50.0)
@@ -95,3 +95,15 @@ def test_steep_rows_next_to_others_are_no_obstacle(seed: int, count: int) -> Non
     assert (table @ c - right).max() <= 1e-5
     found = linprog(-gradient, A_ub=table, b_ub=right, bounds=(0.0, 50.0), method="highs")
     assert gradient @ c == pytest.approx(-found.fun, rel=STEEP_GAP)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_where_rounding_hides_the_gap_it_ends_all_the_same(seed: int) -> None:
+    """A gap of some roundings of g·c: the optimum is reached, and told to be."""
+    gradient, rows = uneven_splines(seed, 300)
+    none, most = np.zeros(302), np.full(302, 50.0)
+    c, reached = banded_optimum(gradient, rows, none + 1e-3, none, most, gap=1e-11)
+    assert reached
+    table, right = dense(rows)
+    found = linprog(-gradient, A_ub=table, b_ub=right, bounds=(0.0, 50.0), method="highs")
+    assert gradient @ c == pytest.approx(-found.fun, rel=2.0 * GAP)
