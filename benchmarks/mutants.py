@@ -186,6 +186,7 @@ PARTS = (
             "basics/test_series.py",
             "robot/test_chain_series.py",
             "motion/test_polynomials.py",
+            "motion/test_spline.py",
             "path/test_series.py",
             "certificate/test_bounds_hold.py",
             "certificate/test_made_to_deceive.py",
@@ -201,8 +202,7 @@ PARTS = (
     Part(
         "programs read",
         (
-            "shop/controllers/read_*.py",
-            "shop/controllers/program_reader.py",
+            "shop/controllers/*_reader.py",
             "shop/controllers/program_comments.py",
             "shop/controllers/program_lines.py",
             "shop/controllers/statements.py",

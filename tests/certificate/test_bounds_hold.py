@@ -50,6 +50,7 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, BoundedFunct
     pose = robot.pose(motion.q[0])
     path = sm.paths.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
     free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
+    tilted = (sm.Relaxation(("rx", "ry"), 0.1), free[1])
     given, pointing = sm.Tolerance(), sm.Task.POINTING
     follow = BoundTaskFrame(robot.chain, path, sm.Task.POSE)
     if robot.reference is not None:
@@ -62,6 +63,7 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, BoundedFunct
         "path": _PathErrors(follow, given, ()),
         "pointing": _PathErrors(replace(follow, task=pointing), given, ()),
         "relaxed": _PathErrors(follow, given, free),
+        "pointing, relaxed": _PathErrors(replace(follow, task=pointing), given, tilted),
     } | {
         name: Shares(constraint.quantity(robot))
         for name, constraint in {
@@ -80,6 +82,7 @@ NAMES = [
     "path",
     "pointing",
     "relaxed",
+    "pointing, relaxed",
     "joint",
     "height",
     "swivel",

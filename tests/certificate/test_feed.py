@@ -107,6 +107,14 @@ def test_the_tool_itself_keeps_the_feed(hurry: float, tmp_path: FilePath) -> Non
         assert "kept by the path, but not by 'l3'" in certificate.verdict
 
 
+@pytest.mark.parametrize("feed", [0.002, 0.03])
+def test_what_a_path_leaves_of_its_feed_is_a_share_of_it(feed: float, tmp_path: FilePath) -> None:
+    """A tool that hurries and lags by half of what is allowed keeps slow feeds and quick ones."""
+    path = saddle(feed)
+    (found,) = path.feeds
+    assert followed(path, tmp_path, 0.5 * found.within).verified
+
+
 def of_several_feeds(kind: str) -> tuple[sm.paths.Path, list[float]]:
     """A path at feeds that change twice, and when."""
     legs = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.2, 0.1, 0.0]])

@@ -146,6 +146,20 @@ def test_a_start_velocity_that_the_path_does_not_have_is_refused(
         posed()
 
 
+def test_a_path_that_begins_at_rest_is_said_to_begin_at_0(panda: sm.RobotModel) -> None:
+    """Also where the way from there is along a negative axis, and its speed -0."""
+    first = panda.pose(PANDA_HOME)
+    turned = np.linalg.pinv(panda.jacobian(PANDA_HOME)) @ np.eye(6)[0]
+    for way in (-0.1, 0.1):
+        last = SE3(first.rotation, first.translation + np.array([way, 0.0, 0.0]))
+        path = sm.paths.Line(first, last, 2.0)
+        assert path.twist(0.0)[0] == 0.0
+        with pytest.raises(sm.errors.ProblemError, match="the path begins at 0;"):
+            sm.Problem(
+                panda, path, start=PANDA_HOME, constraints=[sm.constraints.StartVelocity(turned)]
+            )
+
+
 def test_rates_at_ends_are_those_of_rest_where_nothing_else_is_said(panda: sm.RobotModel) -> None:
     asked = sm.constraints
     for kind in (

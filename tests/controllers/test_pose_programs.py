@@ -23,12 +23,8 @@ from selfmotion.shop.controllers.configurations import confdata, status_and_turn
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
 from selfmotion.shop.controllers.program_settings import axes_of
 from selfmotion.shop.controllers.segments import Deviation, Deviations, deviation_between
-<<<<<<< HEAD
-from selfmotion.shop.controllers.tool_frames import ToolFrames, frame_of_paths
-=======
 from selfmotion.shop.controllers.tool_frames import ToolFrames
-from selfmotion.shop.controllers.work_objects import frame_of_paths, turned_base
->>>>>>> 71528106c765ed0b7e14575200ce4cb362f96928
+from selfmotion.shop.controllers.work_objects import frame_of_paths
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams
 from support.own_kinematics import Arm

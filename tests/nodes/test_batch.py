@@ -89,6 +89,16 @@ def test_each_is_what_it_is_alone_with_other_costs(panda: sm.RobotModel, rest: b
         assert (after.costs < before.costs).any()
 
 
+def test_ends_at_rest_stay_at_rest(panda: sm.RobotModel) -> None:
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = problem_of((panda, "position", PANDA_HOME, path), rest=True)
+    before = Batch.near(grid_of(problem), motions_of(problem))
+    after = advanced(before, 2)
+    assert (after.costs < before.costs).all()
+    for rates in (after.qd, after.qdd):
+        assert np.abs(rates[:, [0, -1]]).max() <= ROUNDING * np.abs(rates).max()
+
+
 def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
     problem = problem_of(case)
     grid, motions = grid_of(problem), motions_of(problem, 3, 0.1)

@@ -6,22 +6,29 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.nodes import NodeMotion, Step, minimise, newton
+from selfmotion.planning.nodes import NodeMotion, Step, minimise, newton, newton_system
 from selfmotion.planning.nodes.motion import moved_along
-from selfmotion.planning.nodes.newton import _merit, _raise_merit_penalty, _Solver
+from selfmotion.planning.nodes.newton import (
+    _complementarity_residual,
+    _merit,
+    _raise_merit_penalty,
+    _Solver,
+)
 from selfmotion.planning.nodes.newton_system import Change, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
 from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, start_of
-from support.nodes import centred, moved, nodes_of, problem_of
+from support.nodes import centred, moved, nodes_of, problem_of, random_step
 
 # A motion that is closed up to this at its last node [rad].
 OFF = 1e-3
-# Share of Newton's step by which merit functions are differentiated.
+# Share of a step by which functions along it are differentiated.
 NEAR = 1e-5
 # Of such differences; of a quadratic form against the system without what is added to its diagonal.
 DIFFERENCE, DIAGONAL = 1e-3, 1e-3
+# Of the linear equations that a step solves, in units of their largest term.
+SOLVED = 1e-9
 
 
 def problem(panda: sm.RobotModel, *constraints: sm.constraints.Constraint, **more) -> sm.Problem:
@@ -126,6 +133,134 @@ def test_what_a_step_promises_is_its_quadratic_form(panda: sm.RobotModel) -> Non
     softer = system.step(30.0 * solver._barrier)
     flat = softer.nodes.ravel()
     assert softer.promised == pytest.approx(float(flat @ matrix.dense() @ flat), rel=DIAGONAL)
+
+
+def spread(solver: _Solver) -> None:
+    """Put slacks, elastic variables and multipliers far from the central path, above 0."""
+    rng = np.random.default_rng(4)
+    slacks, elastics, shares = rng.uniform(0.2, 0.8, size=(3, len(solver._slacks)))
+    solver._slacks, solver._elastics, solver._multipliers = slacks, elastics, shares * solver._rho
+
+
+def test_a_step_solves_the_linearised_conditions_of_an_optimum(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of `newton`, without elimination, wherever slacks and multipliers are."""
+    # What is added to the diagonal is no part of them.
+    without = replace(SETTINGS, flat_share=0.0)
+    monkeypatch.setattr(newton_system, "SETTINGS", without)
+    solver = _Solver(bound(panda), None, SETTINGS.mu_first, roughly=False)
+    spread(solver)
+    # As much as the other products.
+    solver._barrier = 0.2 * solver._rho
+    model, step = stepped(solver)
+    assert solver._shift == 0.0
+    s, e, multipliers, mu = solver._slacks, solver._elastics, solver._multipliers, solver._barrier
+    left = solver._rho - multipliers
+    changed = model.rows.along(model.by.along(step.nodes))
+    rows = solver._h + changed + s + step.slacks - e - step.elastics
+    np.testing.assert_allclose(rows, 0.0, atol=SOLVED)
+    by_slack = s * multipliers + s * step.multipliers + multipliers * step.slacks
+    by_elastic = e * left - e * step.multipliers + left * step.elastics
+    np.testing.assert_allclose(by_slack, mu, rtol=SOLVED)
+    np.testing.assert_allclose(by_elastic, mu, rtol=SOLVED)
+    ends = model.border.columns.T @ step.nodes.ravel() + solver.motion.c
+    np.testing.assert_allclose(ends, 0.0, atol=SOLVED)
+    # ∂²L p + ∇F + λᵀ∂h + νᵀ∂c = 0 of all coordinates that are not held.
+    matrix = model.curvature.banded()
+    matrix.add(0, 0, model.around.curvature)
+    after = solver._rows.of_all(multipliers + step.multipliers)
+    pulled = model.around.pulled(solver.motion.grid.spline.scattered(model.rows.pulled(after)))
+    terms = [
+        matrix.dense() @ step.nodes.ravel(),
+        model.gradient.ravel(),
+        pulled.ravel(),
+        model.border.columns @ step.end_multipliers,
+    ]
+    free = np.ones(step.nodes.size, dtype=bool)
+    free[solver.motion.grid.held] = False
+    assert all(np.abs(term[free]).max() > 0.0 for term in terms)
+    largest = max(np.abs(term).max() for term in terms)
+    np.testing.assert_allclose(np.sum(terms, axis=0)[free], 0.0, atol=SOLVED * largest)
+
+
+def test_multipliers_of_ends_count_with_the_bending_of_their_conditions(
+    panda: sm.RobotModel,
+) -> None:
+    """The matrix has ∂²(νᵀc)/∂w², here by second differences of νᵀc along a step."""
+    motion = centred(nodes_of(problem(panda, sm.constraints.ClosedPath(), rest=False), 8))
+    rows = _Solver(motion, None, SETTINGS.mu_first, roughly=False)._rows
+    multipliers = np.random.default_rng(5).normal(size=motion.grid.ends.count)
+    without, bent = (Model.of(motion, rows, share * multipliers) for share in (0.0, 1.0))
+    assert without is not None
+    assert bent is not None
+    step = random_step(motion, 6)
+    added = np.einsum("ki,kij,kj->", step, bent.around.curvature - without.around.curvature, step)
+    above, below = (moved(motion, sign * NEAR * step * motion.grid.scale).c for sign in (1.0, -1.0))
+    expected = float(multipliers @ (above - 2.0 * motion.c + below)) / NEAR**2
+    assert added == pytest.approx(expected, rel=DIFFERENCE)
+
+
+def test_products_are_as_far_from_the_barrier_as_the_farthest(panda: sm.RobotModel) -> None:
+    """|s λ - μ| of slacks, |e (ρ - λ) - μ| of elastic variables: either may be the largest."""
+    solver = _Solver(bound(panda), None, SETTINGS.mu_first, roughly=False)
+    spread(solver)
+    mu, rho, ones = solver._barrier, solver._rho, np.ones(len(solver._slacks))
+    for share in (0.25, 0.75):
+        solver._multipliers = share * rho * ones
+        solver._slacks = mu / solver._multipliers
+        solver._elastics = mu / (rho - solver._multipliers)
+        assert _complementarity_residual(solver) <= SOLVED * mu
+        for name in ("_slacks", "_elastics"):
+            near = getattr(solver, name)
+            for off in (-0.5, 3.0):
+                row = np.arange(len(near)) == 2
+                setattr(solver, name, near * (1.0 + off * row))
+                assert _complementarity_residual(solver) == pytest.approx(abs(off) * mu)
+            setattr(solver, name, near)
+
+
+def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.RobotModel) -> None:
+    """Slacks close all residuals; where rows hold, elastic variables are on the central path."""
+    begin = bound(panda)
+    known = np.where(begin.h > -0.5, 0.3 * abs(begin.objective), 0.0)
+    solver = _Solver(begin, known, SETTINGS.mu_first, roughly=False)
+    h = solver._h
+    assert h.min() < 0.0 < h.max()
+    np.testing.assert_allclose(solver._residuals, 0.0, atol=SOLVED)
+    first = SETTINGS.mu_warm / SETTINGS.mu_first * cold_barrier(begin)
+    room = solver._elastics * (solver._rho - solver._multipliers)
+    holds = -h >= first / solver._multipliers
+    np.testing.assert_allclose(room[holds], first, rtol=SOLVED)
+    # Of others the violation comes on top.
+    beyond = h + first / solver._multipliers
+    expected = beyond + first / (solver._rho - solver._multipliers)
+    np.testing.assert_allclose(solver._elastics[~holds], expected[~holds], rtol=SOLVED)
+
+
+def cold_barrier(begin: NodeMotion) -> float:
+    return _Solver(begin, None, SETTINGS.mu_first, roughly=False)._barrier
+
+
+@pytest.mark.parametrize("unit", [2.0**-100, 2.0**40])
+def test_the_unit_of_costs_changes_no_bit_of_a_step(panda: sm.RobotModel, unit: float) -> None:
+    """Where it is a power of two; also of a matrix that is not positive definite."""
+
+    def steps(unit: float) -> tuple[list[np.ndarray], float]:
+        hill = sm.costs.FunctionCost(lambda qd, q, t: -20.0 * unit * np.sum(q**2, axis=1))
+        costs = [sm.costs.JointVelocity(unit), hill]
+        asked = problem(panda, sm.constraints.JointVelocityLimits(1.0), costs=costs)
+        solver = _Solver(nodes_of(asked, 8), None, SETTINGS.mu_first, roughly=False)
+        found = []
+        for _ in range(2):
+            found.append(stepped(solver)[1].nodes)
+            solver.advance(never)
+        return found, solver._shift
+
+    (usual, shift), (other, same) = steps(1.0), steps(unit)
+    assert shift == same > 0.0
+    for mine, others in zip(usual, other, strict=True):
+        np.testing.assert_array_equal(mine, others)
 
 
 def test_no_coordinate_changes_more_in_one_step_than_allowed(

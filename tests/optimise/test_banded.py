@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.sparse import lil_array
 
-from selfmotion.planning.optimise import BandedRows, banded_optimum
+from selfmotion.planning.optimise import BandedRows, banded, banded_optimum
 from selfmotion.planning.result.pace_rows import basis
 
 # The optimum is reached to this share.
@@ -85,7 +85,7 @@ STEEP_GAP = 1e-3
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("count", [300, 1000])
+@pytest.mark.parametrize("count", [200, 300, 1000])
 def test_steep_rows_next_to_others_are_no_obstacle(seed: int, count: int) -> None:
     gradient, rows = uneven_splines(seed, count)
     none, most = np.zeros(count + 2), np.full(count + 2, 50.0)
@@ -95,3 +95,41 @@ def test_steep_rows_next_to_others_are_no_obstacle(seed: int, count: int) -> Non
     assert (table @ c - right).max() <= 1e-5
     found = linprog(-gradient, A_ub=table, b_ub=right, bounds=(0.0, 50.0), method="highs")
     assert gradient @ c == pytest.approx(-found.fun, rel=STEEP_GAP)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_where_rounding_hides_the_gap_it_ends_all_the_same(seed: int) -> None:
+    """A gap of some roundings of g·c: the optimum is reached, and told to be."""
+    gradient, rows = uneven_splines(seed, 300)
+    none, most = np.zeros(302), np.full(302, 50.0)
+    c, reached = banded_optimum(gradient, rows, none + 1e-3, none, most, gap=1e-11)
+    assert reached
+    table, right = dense(rows)
+    found = linprog(-gradient, A_ub=table, b_ub=right, bounds=(0.0, 50.0), method="highs")
+    assert gradient @ c == pytest.approx(-found.fun, rel=2.0 * GAP)
+
+
+def test_after_the_last_programme_with_part_of_the_rows_one_has_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """So there is one if no other is wanted."""
+    gradient, rows = programme(np.random.default_rng(2), 40, 3)
+    bound = np.full(42, 5.0)
+    usual, reached = banded_optimum(gradient, rows, np.zeros(42), -bound, bound)
+    assert reached
+    monkeypatch.setattr(banded, "_ROUNDS", 0)
+    whole, reached = banded_optimum(gradient, rows, np.zeros(42), -bound, bound)
+    assert reached
+    assert gradient @ whole == pytest.approx(gradient @ usual, rel=2.0 * GAP)
+
+
+def test_shares_are_shares() -> None:
+    """Mehrotra 1992, section 4, and Wright 1997, chapter 5: each is within 0 and 1."""
+    for name in (
+        *("_MU_FLOOR", "_STALL_RESIDUAL", "_STALL_FACTOR", "_TAU", "_NEIGHBOURHOOD"),
+        *("_SHORTENING", "_SHORT_STEP", "_CENTRING", "_MIN_STEP", "_ROOM_FIRST", "_ROOM_LATER"),
+        "_SHARE_OF_WORST",
+    ):
+        assert 0.0 < getattr(banded, name) < 1.0, name
+    assert banded._MIN_STEP < banded._SHORT_STEP
+    assert banded._ROOM_LATER < banded._ROOM_FIRST

@@ -50,3 +50,16 @@ def test_contradictory_rows_have_no_answer() -> None:
     upper = np.array([-1.0, -1.0])
     lower, reach = np.full(2, -np.inf), np.full(2, np.inf)
     assert minimize_quadratic(np.eye(2), np.ones(2), rows, lower, upper, reach) is None
+
+
+def test_rows_of_zeros_hold_or_contradict() -> None:
+    """They are not scaled."""
+    hessian, gradient, reach = np.eye(2), np.array([1.0, -2.0]), np.full(2, np.inf)
+    for upper, holds in ((0.5, True), (-0.5, False)):
+        found = minimize_quadratic(
+            hessian, gradient, np.zeros((1, 2)), np.array([-1.0]), np.array([upper]), reach
+        )
+        assert (found is not None) is holds
+        if found is not None:
+            np.testing.assert_allclose(found[0], -gradient, atol=1e-9)
+            np.testing.assert_allclose(found[1], 0.0)

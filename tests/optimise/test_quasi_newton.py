@@ -88,6 +88,27 @@ def test_unbounded_functions_are_named() -> None:
     assert "JointVelocity" in found.status.message
 
 
+def test_a_start_that_costs_nothing_is_no_bound_of_what_follows() -> None:
+    """F falls from 0 to its minimum -1, as it would from anywhere else."""
+    function = Counted(lambda x: float((x[0] - 1.0) ** 2) - 1.0, lambda x: 2.0 * (x - 1.0))
+    found = plain().minimize(function, np.zeros(1))
+    assert found.status is sm.optimise.Status.CONVERGED
+    assert found.cost == pytest.approx(-1.0)
+
+
+def test_a_wrong_gradient_is_told_as_long_as_it_can_be_asked_for() -> None:
+    """It takes two evaluations to know; without them the limit is the reason."""
+    wrong = Counted(lambda x: float(x @ x) + 1.0, lambda x: -2.0 * x)
+    start = np.array([1.0, 2.0])
+    assert plain().minimize(wrong, start).status is sm.optimise.Status.GRADIENT
+    needed, reasons = wrong.evaluations, []
+    for limit in (needed - 1, needed, needed + 3):
+        wrong.evaluations = 0
+        reasons.append(plain().minimize(wrong, start, max_evaluations=limit).status)
+    told = sm.optimise.Status
+    assert reasons == [told.MAX_EVALUATIONS, told.GRADIENT, told.GRADIENT]
+
+
 def interrupted_after(count: int, error: BaseException) -> Minimum:
     function = rosenbrock()
     value = function._value

@@ -299,12 +299,27 @@ def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
         ({"part": "block"}, "expected names"),
         ({"of": "base"}, "part says what belongs"),
         ({"executor": 3}, "executor is 3"),
+        ({"center": (0.0, 0.0)}, "place: center"),
     ):
         asked = {"within": {"x": (0.0, 0.1)}, "part": ["block"], **given}
         with pytest.raises(sm.errors.ProblemError, match=said):
             sm.place(panda(), **asked)  # type: ignore[arg-type]
     with pytest.raises(sm.errors.PlanError, match="no verified motion at any"):
         sm.place(planar(), {"x": (50.0, 60.0)})
+
+
+def test_the_place_where_it_is_says_why_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all places without motions the first: another one where the box does not hold that."""
+    monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
+
+    def nowhere(self: Places, place: Array, *near: object, **given: bool) -> Tried:
+        return Tried(place, np.inf, f"nothing at {place[0]:.3f}")
+
+    monkeypatch.setattr(Places, "tried", nowhere)
+    with pytest.raises(sm.errors.PlanError, match=r"x 0: nothing at 0\.000; widen the box"):
+        sm.place(planar(), {"x": (-0.1, 0.1)}, center=(0.0, 0.0, 0.0))
+    with pytest.raises(sm.errors.PlanError, match=r"x 1\.5: nothing at 1\.500"):
+        sm.place(planar(), {"x": (1.0, 2.0)})
 
 
 def test_a_path_that_goes_with_the_base_is_refused() -> None:

@@ -116,6 +116,34 @@ def test_a_pair_that_two_displacements_lack_is_raised_once() -> None:
             assert with_margin._adjusted(known, Shortfalls(both, 0.5), 0.0) == alone
 
 
+def test_clearances_change_by_what_displacements_take_of_them() -> None:
+    """To first order, a distance above the clearance in proportion to the displacement."""
+    pair, other = ("a", "b"), ("c", "d")
+    distance, clearance, used = 0.05, 0.01, 0.03
+
+    def adjusted(
+        scale: float, before: dict[tuple[str, str], float]
+    ) -> dict[tuple[str, str], float]:
+        lack = Shortfall("part", ("b", "a"), 0.0, scale, used)
+        return with_margin._adjusted(before, Shortfalls((lack,), 0.0), clearance)
+
+    # Of more than is wanted by a quarter, a quarter is given back, and of nothing nothing.
+    given = adjusted(1.25, {pair: distance, other: clearance})
+    assert given[pair] == pytest.approx(distance - 0.25 * (distance - clearance))
+    assert given[other] == clearance
+    # What is lacking is added, with a little more; a new pair gets all that is used.
+    added = adjusted(0.4, {pair: distance})[pair] - distance
+    assert 0.6 * used < added < 0.6 * used + 1e-4
+    assert used < adjusted(0.4, {})[pair] - clearance < 1.1 * used
+
+
+def test_margins_are_told_in_millimetres_and_degrees(found: sm.placement.PlanWithMargin) -> None:
+    told = dataclasses.replace(found, wanted=sm.Margin(1e-3, np.radians(1.0)))
+    assert str(told).startswith("margin of 1 mm and 1° of part, base, proved; cost ")
+    # Of what costs nothing there is no share.
+    assert dataclasses.replace(found, cost_without=0.0).extra_cost == 0.0
+
+
 def test_what_cannot_be_bought_is_refused(problem: sm.Problem) -> None:
     for given, said in (
         ({"margin": 0.01}, "expected a Margin"),

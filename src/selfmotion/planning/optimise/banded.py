@@ -285,9 +285,6 @@ def _search_direction(
         k = place[r]
         for a in range(3):
             dc[k + a] -= becomes * matrix[r, a]
-    for k in range(len(dc)):
-        if not free[k]:
-            dc[k] = 0.0
     _solve(band, dc)
     for k in range(len(dc)):
         if not free[k]:

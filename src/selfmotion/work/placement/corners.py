@@ -41,7 +41,7 @@ _DIRECTIONS = np.vstack(
 # an axis and the two diagonals beside it; its normal is (1, √3 - 1, 0).
 _INSCRIBED = 1.0 / math.hypot(1.0, math.sqrt(3.0) - 1.0)
 # Factor to the next size after one that is confirmed in all directions.
-_GROWTH = 1.6
+_GROWTH = 4.0
 # Bisections between the largest confirmed size and the smallest refused one.
 _HALVINGS = 5
 # Sizes below this share of the largest one count as none.
@@ -222,7 +222,7 @@ class _Corners:
                 directions.insert(0, directions.pop(first))
             else:
                 low, confirmed = size, tuple(tried)
-            if low >= most or high <= _LEAST * most or high - low <= high / 2**_HALVINGS:
+            if low >= most or high <= _LEAST * most or low >= (1.0 - 0.5**_HALVINGS) * high:
                 break
             size = min(_GROWTH * low, most) if math.isinf(high) else 0.5 * (low + high)
         return CorrectionSide(_INSCRIBED * low, confirmed, estimate, stops)
