@@ -24,7 +24,7 @@ from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
 from selfmotion.shell.replay.motion import curves, key_frames
 from selfmotion.shell.replay.redundancy import FEWER_PIXELS, slices
-from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay.replayed import PlanReplay, clearance_of
 from support.arms import short_line
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
@@ -201,6 +201,34 @@ def test_curves_know_a_path_that_is_missed():
     reach = np.linalg.norm(missed.tool[:, :2], axis=1)
     assert np.all(missed.position_error > 0.00999 * reach)
     assert missed.position_error.max() == pytest.approx(0.01 * reach.max(), rel=1e-3)
+
+
+def test_each_pair_is_held_to_the_distance_that_its_own_clearance_requires():
+    """The closest one of all; of several clearances that have it, to the largest distance."""
+    plan = arm_plan("panda")
+    tool = plan.robot.pose(plan.trajectory.q[0]).translation
+    ball, far = (
+        sm.obstacles.Sphere(name, tool + np.array([0.0, 0.0, away]), 0.05)
+        for name, away in (("ball", -0.06), ("far", -0.9))
+    )
+    asked = [
+        sm.constraints.Clearance([far], 1e-3),
+        sm.constraints.Clearance([ball, far], 3e-3),
+        sm.constraints.Clearance([far], 2e-3),
+    ]
+    curve = clearance_of(replace(plan, problem=replace(plan.problem, clearance=asked)))
+    alone = clearance_of(replace(plan, problem=replace(plan.problem, clearance=asked[0])))
+    assert any("ball" in pair for pair in curve.pairs)
+    np.testing.assert_array_equal(curve.required, 3e-3)
+    np.testing.assert_array_equal(alone.required, 1e-3)
+    # So it is in the other order.
+    turned = clearance_of(replace(plan, problem=replace(plan.problem, clearance=asked[::-1])))
+    np.testing.assert_array_equal(turned.required, curve.required)
+    np.testing.assert_array_equal(turned.value, curve.value)
+    only = [replace(asked[1], obstacles=[ball], distance=5e-4), asked[0]]
+    own = clearance_of(replace(plan, problem=replace(plan.problem, clearance=only)))
+    for pair, required in zip(own.pairs, own.required, strict=True):
+        assert required == (5e-4 if "ball" in pair else 1e-3)
 
 
 def test_what_is_relaxed_is_not_shown_as_an_error():

@@ -59,10 +59,6 @@ class _Motion:
         points = replayed.points(brief=brief)
         self.tips = [ToolTip(plan, item, points) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
-        # Largest required distance of bodies [m].
-        self.required_distance = max(
-            (item.distance for item in plan.problem.clearances), default=0.0
-        )
         self.clearance = None if brief else replayed.clearance()
         self.self_motion = None if brief else replayed.self_motion()
 
@@ -236,9 +232,7 @@ def _plan(
             "matrix": payload.array(shown.ellipsoid),
             "tool": payload.array(shown.tool_in_world),
         },
-        "clearance": None
-        if motion.clearance is None
-        else _clearance(motion.clearance, payload) | {"asked": motion.required_distance},
+        "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in obstacles},
         "riders": scene.riders(root, motion.plan.robot, obstacles),
         "commands": [
@@ -304,6 +298,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
         "value": payload.array(curve.value),
         "pairs": curve.pairs,
         "points": payload.array(curve.points),
+        "required": payload.array(curve.required),
     }
 
 

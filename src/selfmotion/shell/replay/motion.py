@@ -255,35 +255,44 @@ class ClearanceCurve:
         The pair at each time.
     points : (K, 2, 3)
         Where the two are nearest, in world axes [m].
+    required : (K,)
+        Distance that the clearance requires which has the pair; the largest one of several [m].
     """
 
     t: Array
     value: Array
     pairs: tuple[tuple[str, str], ...]
     points: Array
+    required: Array
 
 
 def clearance_curve(
-    trajectory: Trajectory, models: Sequence[CollisionModel]
+    trajectory: Trajectory, bodies: Sequence[tuple[CollisionModel, float]]
 ) -> ClearanceCurve | None:
-    """Return the clearance along a motion, or None where there is no pair of bodies to check."""
-    watched = [model for model in models if model.pairs]
+    """Return the clearance along a motion, or None where there is no pair of bodies to check.
+
+    `bodies` are models, and the distance that is required in each [m].
+    """
+    watched = [(model, required) for model, required in bodies if model.pairs]
     if not watched:
         return None
     times = np.linspace(0.0, trajectory.duration, _POINTS)
     clock = np.minimum(trajectory.t[0] + times, trajectory.t[-1])
-    found, points = [], []
+    found, points, asked = [], [], []
     for q in trajectory(clock):
-        closest, model = min(
-            ((model.distance(q), model) for model in watched), key=lambda item: item[0].value
+        closest, required, model = min(
+            ((model.distance(q), required, model) for model, required in watched),
+            key=lambda item: (item[0].value, -item[1]),
         )
         found.append(closest)
+        asked.append(required)
         points.append(model.nearest_points(q, closest.first, closest.second))
     return ClearanceCurve(
         times,
         np.array([each.value for each in found]),
         tuple((each.first, each.second) for each in found),
         np.array(points),
+        np.array(asked),
     )
 
 

@@ -215,5 +215,4 @@ class PlanReplay:
 
 def clearance_of(plan: Plan) -> ClearanceCurve | None:
     """Return the distances of a plan's bodies over time; None where there are none."""
-    models = [model for model, _ in plan.problem.envelope.bodies]
-    return clearance_curve(plan.trajectory, models)
+    return clearance_curve(plan.trajectory, plan.problem.envelope.bodies)

@@ -165,8 +165,8 @@ class Page {
     get("pair").classList.toggle("meet", apart <= 0);
     get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(1e3 * apart)} mm`
       : `${first} and ${second} meet`;
-    // Coloured only where it matters: where they meet, or are nearer than twice what was asked.
-    const near = apart < 2 * clearance.asked;
+    // Coloured only where it matters: where they meet, or are nearer than twice what is required of them.
+    const near = apart < 2 * clearance.required[k];
     this.stage?.mark(apart <= 0 || near ? [first, second] : [], this.plan.obstacles, apart <= 0);
     const ends = [0, 3].map((from) => Array.from(clearance.points.subarray(6 * k + from, 6 * k + from + 3)));
     this.stage?.connect(ends, `${format(1e3 * apart)} mm`, near || apart <= 0);
