@@ -183,8 +183,9 @@ class VelocityByPosition(Requirement):
         limited = self.curves.limited
         return (_COVERED if limited.all() else of_some(_COVERED),) if limited.any() else ()
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the largest share of a limit that was measured.
+        """Return the largest share of a limit that was measured.
 
         Whether it is satisfied is proved by control points on intervals that are halved.
         """

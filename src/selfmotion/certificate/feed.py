@@ -46,8 +46,9 @@ class FeedReached(Requirement):
     name: str = "feed"
 
     @property
+    @override
     def remarks(self) -> tuple[str, ...]:
-        """See `Requirement.remarks`: whether it is no proof."""
+        """Whether it is no proof."""
         unknown = any(
             path_series(path, np.array([0.5 * path.duration]), np.array([1e-3 * path.duration]))
             is None
@@ -55,8 +56,9 @@ class FeedReached(Requirement):
         )
         return ("feed: checked at samples only",) if unknown else ()
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the slowest speed where the feed counts."""
+        """Return the slowest speed where the feed counts."""
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
         if not found.kept:
             text = FeedPossible(found).text(self.follow.path)

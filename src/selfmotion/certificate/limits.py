@@ -79,8 +79,9 @@ class JointLimits(Requirement):
         said = f"{self.name}: {count} of {len(self.upper)} joints are not limited"
         return (said,) if count else ()
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
+        """Return a margin (order 0), or the share of the limit that is used."""
         times, values = motion.trajectory.extremes(self.order)
         if self.order == 0:
             margins = np.stack([values[0] - self.lower, self.upper - values[1]])
@@ -184,8 +185,9 @@ class EndState(Requirement):
     def name(self) -> str:  # type: ignore[override]  # it follows from the order
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: of the joint with the largest error."""
+        """Of the joint with the largest error."""
         row = 0 if self.at_start else -1
         reached = motion.trajectory(motion.trajectory.t[row], self.order)
         words = "off the one asked for" if self.order else "away from where it should"
@@ -220,8 +222,9 @@ class AtRest(Requirement):
         where = "both ends" if self.start and self.end else "the start" if self.start else "the end"
         return (f"rest at {where}",)
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the joint that is the farthest from rest at an end."""
+        """Return the joint that is the farthest from rest at an end."""
         given, found = motion.trajectory, list[Finding]()
         wanted = ((0, self.start, self.smooth[0]), (-1, self.end, self.smooth[1]))
         for row, rests, is_smooth in wanted:
@@ -255,8 +258,9 @@ class ClosedMotion(Requirement):
     velocity: bool
     name: str = "closed path"
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: of the joint with the largest error."""
+        """Of the joint with the largest error."""
         q, qd = motion.trajectory.q, motion.trajectory.qd
         end_error = _end_error(self.name, motion, q[-1] - q[0], 0, "away from the start")
         if not (end_error.satisfied and self.velocity):

@@ -177,8 +177,9 @@ class QuantityWithinLimits(Requirement):
         return self.quantity.name
 
     @property
+    @override
     def covers(self) -> tuple[str, ...]:
-        """See `Requirement.covers`: nothing where there are no limits."""
+        """Nothing where there are no limits."""
         if not len(self.quantity.limited):
             return ()
         return (self.name,) if self.quantity.covers is None else self.quantity.covers
@@ -193,8 +194,9 @@ class QuantityWithinLimits(Requirement):
             said.append(f"{self.name}: checked at samples only, as it gives no bounds")
         return tuple(said)
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the largest share of a limit."""
+        """Return the largest share of a limit."""
         quantity, t = self.quantity, motion.trajectory.t
         if not len(quantity.limited):
             return Finding(self.name, "nothing", float(t[0]), 0.0, 1.0, True, "not limited")
@@ -242,8 +244,9 @@ class Shares(BoundedFunction):
         self.of, self.allowed = np.arange(count), np.ones(count)
         self.wanted, self.blocks = np.full(count, _FINE), np.arange(count) * quantity.components
 
+    @override
     def series(self, segments: MotionSegments) -> Array | None:
-        """See `BoundedFunction.series`; inf where an angle may turn by a period."""
+        """Inf where an angle may turn by a period."""
         quantity = self._quantity
         known = quantity.series and quantity.series(segments)
         if known is None:
@@ -270,6 +273,7 @@ class Shares(BoundedFunction):
             away = np.unwrap(away, period=quantity.period, axis=1)
         return np.asarray((away / self._limit[:, None]).reshape(*shape, -1))
 
+    @override
     def sizes(self, values: Array, segments: MotionSegments) -> Array:
-        """See `BoundedFunction.sizes`: lengths, in units of the limits."""
+        """Lengths, in units of the limits."""
         return np.asarray(np.sqrt(np.add.reduceat(values**2, self.blocks, axis=2)))

@@ -49,8 +49,9 @@ class Separation(Requirement):
     distance: float
     name: str = "clearance"
 
+    @override
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the closest pair, to a fiftieth of its distance."""
+        """Return the closest pair, to a fiftieth of its distance."""
         stuck = self.model.stuck
         if stuck is not None:
             names, time = f"{stuck.first} - {stuck.second}", float(motion.trajectory.t[0])
@@ -75,8 +76,9 @@ class Separation(Requirement):
             self.name, found.names, found.time, near, self.distance, selected, text, unit="m"
         )
 
+    @override
     def approaches(self, motion: FinishedMotion) -> dict[str, Extreme]:
-        """See `Requirement.approaches`: each to a fiftieth of its distance."""
+        """Each to a fiftieth of its distance."""
         found = {
             name: closest_at_all_times(model, motion.trajectory, 0.0)
             for name, model in self.model.groups.items()
@@ -97,8 +99,9 @@ class Separation(Requirement):
         return self.model.obstacles
 
     @property
+    @override
     def remarks(self) -> tuple[str, ...]:
-        """See `Requirement.remarks`: pairs that are left out and why, and open meshes."""
+        """Pairs that are left out and why, and open meshes."""
         left_out = [
             f"{x.first} - {x.second} ({x.extent})"
             for x in self.model.overlapping

@@ -345,8 +345,9 @@ class Capsule(Obstacle):
     def geometry(self) -> Any:
         return coal.Capsule(self.radius, self.length)
 
+    @override
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """See `Obstacle.urdf_shapes`: a cylinder and two spheres."""
+        """Return a cylinder and two spheres."""
         ends = (0.5 * self.length, -0.5 * self.length)
         caps = (UrdfShape("sphere", {"radius": repr(self.radius)}, height) for height in ends)
         return [_cylinder(self.radius, self.length), *caps]

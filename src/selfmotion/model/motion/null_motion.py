@@ -118,8 +118,9 @@ class PolynomialNullMotion(NullMotion):
         as_choice(self.basis, "null motion: basis", ("legendre", "monomial"))
 
     @property
+    @override
     def fewest_steps(self) -> int:
-        """See `NullMotion.fewest_steps`: four for each coefficient."""
+        """Four for each coefficient."""
         return 4 * (self.degree + 1)
 
     @override
@@ -156,8 +157,9 @@ class BSplineNullMotion(NullMotion):
         as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
 
     @property
+    @override
     def fewest_steps(self) -> int:
-        """See `NullMotion.fewest_steps`: four for each interval."""
+        """Four for each interval."""
         return 4 * self.intervals
 
     @override
@@ -178,12 +180,14 @@ class FreeNullMotion(NullMotion):
     """
 
     @property
+    @override
     def fewest_steps(self) -> int:
-        """See `NullMotion.fewest_steps`: those of the cubic."""
+        """Those of the cubic."""
         return PolynomialNullMotion().fewest_steps
 
+    @override
     def functions(self, t: Array, duration: float) -> Array:
-        """See `NullMotion.functions`: those of the cubic."""
+        """Those of the cubic."""
         return PolynomialNullMotion().functions(t, duration)
 
 
@@ -212,16 +216,19 @@ class NodeNullMotion(NullMotion):
         object.__setattr__(self, "times", tuple(float(time) for time in times))
 
     @property
+    @override
     def fewest_steps(self) -> int:
-        """See `NullMotion.fewest_steps`: one for each interval."""
+        """One for each interval."""
         return len(self.times) - 1
 
+    @override
     def functions(self, t: Array, duration: float) -> Array:
-        """See `NullMotion.functions`: each is 1 at one node and 0 at the others."""
+        """Each is 1 at one node and 0 at the others."""
         return self.resting(t, duration, (0, 0))
 
+    @override
     def resting(self, t: Array, duration: float, orders: tuple[int, int]) -> Array:
-        """See `NullMotion.resting`: the end's own function is 0, the others start without slope."""
+        """Return functions of which the end's own one is 0; the others start without slope."""
         from scipy.interpolate import CubicSpline
 
         values = np.eye(len(self.times))

@@ -223,13 +223,15 @@ class _Derived(Path):
         """Return when times of the original (K,) are passed, (K,) [s]."""
 
     @property
+    @override
     def notes(self) -> tuple[str, ...]:
-        """See `Path.notes`: those of the original as well."""
+        """Those of the original as well."""
         return tuple(dict.fromkeys((*self._path.notes, *super().notes)))
 
     @property
+    @override
     def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
+        """As the original."""
         return self._path.oriented
 
     def _at_pace(self, t: Array, sigma: Array, rate: Array) -> PathSamples:
@@ -254,8 +256,9 @@ class _Derived(Path):
 class _InStep(_Derived):
     """One that is elsewhere than the original, but at the same times."""
 
+    @override
     def when(self, wanted: Array) -> Array:
-        """See `_Derived.when`: at the same times."""
+        """At the same times."""
         return wanted
 
     @property

@@ -46,8 +46,9 @@ class Placed(_InStep, kind="placed"):
         """Pose of the frame in the world."""
         return SE3(self._frame)
 
+    @override
     def at_constant_speed(self) -> Placed:
-        """See `Path.at_constant_speed`: as the original."""
+        """As the original."""
         return Placed(self._path.at_constant_speed(), self._frame)
 
     @override
@@ -57,8 +58,9 @@ class Placed(_InStep, kind="placed"):
         translation = inner.translation @ turn.T + self._frame.translation
         return PathSamples(t, translation, turn @ inner.rotation, twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`: lengths and angles stay."""
+        """Lengths and angles stay."""
         return path_series(self._path, middle, half)
 
     @override
@@ -105,8 +107,9 @@ class Reversed(_Derived, kind="reversed"):
     def feeds(self) -> tuple[FeedProfile, ...]:
         return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
+    @override
     def at_constant_speed(self) -> Reversed:
-        """See `Path.at_constant_speed`: as the original."""
+        """As the original."""
         return Reversed(self._path.at_constant_speed())
 
     def when(self, wanted: Array) -> Array:
@@ -118,8 +121,9 @@ class Reversed(_Derived, kind="reversed"):
         sigma = np.clip(self.duration - t, 0.0, self.duration)
         return self._at_pace(t, sigma, -np.ones_like(t))
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`: bounds of derivatives are the same in reversed time."""
+        """Bounds of derivatives are the same in reversed time."""
         return path_series(self._path, self.duration - middle, half)
 
     @override
@@ -195,24 +199,28 @@ class Retimed(_Derived, kind="retimed"):
         self.duration = float(self._pace.t[-1])
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`: the samples of a cubic pace; else when the original's are passed."""
+        """The samples of a cubic pace; else when the original's are passed."""
         return self._pace.t if self._pace.bend is None else self._passed(self._path.knots)
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`: the samples of the pace, and when the original's are passed."""
+        """The samples of the pace, and when the original's are passed."""
         return np.union1d(self._pace.t, self._passed(self._path.marks))
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`: when corners of the original are passed."""
+        """When corners of the original are passed."""
         corners = self._path.rounded
         return read_only(self.when(corners.ravel()).reshape(corners.shape))
 
     @property
+    @override
     def feeds(self) -> tuple[FeedProfile, ...]:
-        """See `Path.feeds`: those of the original, where it is run through at its own pace."""
+        """Those of the original, where it is run through at its own pace."""
         # At the original's pace, whole intervals between samples of the pace.
         pace = self._pace
         straight = np.abs(np.diff(pace.sigma) - np.diff(pace.t)) <= _OWN * np.diff(pace.t)
@@ -334,14 +342,16 @@ class Section(_Derived, kind="section"):
         return read_only([0.0, *(inner - self._first), self.duration])
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`: those in the section."""
+        """Those in the section."""
         corners = np.clip(self._path.rounded, self._first, self._last) - self._first
         return read_only(corners[corners[:, 1] > corners[:, 0]])
 
     @property
+    @override
     def feeds(self) -> tuple[FeedProfile, ...]:
-        """See `Path.feeds`: those that count in the section."""
+        """Those that count in the section."""
         found = (item.between(self._first, self._last) for item in self._path.feeds)
         return tuple(item.later(-self._first) for item in found if item)
 

@@ -142,8 +142,9 @@ class Feed(_Derived, kind="feed"):
         return read_only([self._paces[0][0], *(end for _, end, _ in self._paces)])
 
     @cached_property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`: when those of the original are passed."""
+        """When those of the original are passed."""
         return self._moved(self._path.knots)
 
     @cached_property
@@ -179,8 +180,9 @@ class Feed(_Derived, kind="feed"):
             here = which == number
             yield here, np.clip(t[here] - start, 0.0, end - start), pace
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`: the original's time over the length, that over time."""
+        """Return the original's time over the length, that over time."""
         reached, length = np.empty(len(middle)), np.empty((series.LENGTH, len(middle)))
         for here, own, pace in self._sections(middle):
             reached[here], length[:, here] = pace(own), pace.series(own, half[here])
@@ -212,8 +214,9 @@ class Feed(_Derived, kind="feed"):
         return stretches
 
     @cached_property
+    @override
     def feeds(self) -> tuple[FeedProfile, ...]:
-        """See `Path.feeds`: errors of its own feeds, each in its interval."""
+        """Errors of its own feeds, each in its interval."""
         if not self.required:
             return ()
         t, required, causes, asked = self._required_at

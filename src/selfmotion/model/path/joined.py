@@ -131,19 +131,22 @@ class Joined(Path, kind="joined"):
             _check_continuous(one, other, number)
 
     @property
+    @override
     def notes(self) -> tuple[str, ...]:
-        """See `Path.notes`: those of all pieces as well."""
+        """Those of all pieces as well."""
         inner = (note for piece in self.pieces for note in piece.notes)
         return tuple(dict.fromkeys((*inner, *super().notes)))
 
     @property
+    @override
     def oriented(self) -> bool:
-        """See `Path.oriented`: as all pieces."""
+        """As all pieces."""
         return all(piece.oriented for piece in self.pieces)
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`: those of the pieces, and where they meet."""
+        """Those of the pieces, and where they meet."""
         return self._merged([piece.knots for piece in self.pieces])
 
     @property
@@ -157,14 +160,16 @@ class Joined(Path, kind="joined"):
         return read_only([*np.concatenate(inner), self.duration])
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`: those of all pieces."""
+        """Those of all pieces."""
         pairs = zip(self.pieces, self._starts, strict=True)
         return read_only(np.concatenate([piece.rounded + start for piece, start in pairs]))
 
     @property
+    @override
     def feeds(self) -> tuple[FeedProfile, ...]:
-        """See `Path.feeds`: those of all pieces."""
+        """Those of all pieces."""
         pairs = zip(self.pieces, self._starts, strict=True)
         return tuple(feed.later(start) for piece, start in pairs for feed in piece.feeds)
 

@@ -296,13 +296,15 @@ class Polyline(Path, kind="polyline"):
         return cls([frame.translation for frame in frames], turns, **options)
 
     @property
+    @override
     def oriented(self) -> bool:
-        """See `Path.oriented`: where quaternions are given."""
+        """Where quaternions are given."""
         return self._oriented
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`: starts and ends of corners, so that steps end there.
+        """Starts and ends of corners, so that steps end there.
 
         Where there is hardly any straight leg between two corners, the second starts at the end of
         the first: very short steps would turn rounding into accelerations.
@@ -314,8 +316,9 @@ class Polyline(Path, kind="polyline"):
         return read_only(self._edges[~dropped])
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`: starts and ends of all corners."""
+        """Starts and ends of all corners."""
         return read_only(self._edges)
 
     @property
@@ -444,8 +447,9 @@ class Polyline(Path, kind="polyline"):
         }
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
-        """See `Saved.from_dict`: files say `quaternions`."""
+        """Files say `quaternions`."""
         return super().from_dict(of_file(values), **context)
 
 

@@ -94,8 +94,9 @@ class Round(Path):
         object.__setattr__(self, "turns", turns)
         as_flag(self.turn_tool, f"{name}: turn_tool", PathError)
 
+    @override
     def at_constant_speed(self) -> Self:
-        """See `Path.at_constant_speed`: it goes round evenly."""
+        """Return the same path, gone round evenly."""
         return replace(self, time_law=TimeLaw.CONSTANT)  # type: ignore[type-var]  # dataclasses
 
     def _oriented(self, turned: Array, omega: Array) -> tuple[Array, Array]:

@@ -71,8 +71,9 @@ class TwistPath(Path, kind="twist"):
         self._set(pose, *_resolve(velocity, check_duration(duration)))
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> TwistPath:
-        """See `Saved.from_dict`: the polynomials, not the function."""
+        """Restore it from the polynomials: the function is not in a file."""
         path = cls.__new__(cls)
         path._set(
             path_pose(values["start"], "twist path: start"),
@@ -158,8 +159,9 @@ class TwistPath(Path, kind="twist"):
 
         return quaternions
 
+    @override
     def twist(self, t: npt.ArrayLike) -> Array:
-        """See `Path.twist`; without the pose, which takes most of the time."""
+        """Without the pose, which takes most of the time."""
         times, single = self._given_times(t)
         twists = self._twist(times)
         return twists[0] if single else twists
@@ -184,8 +186,9 @@ class TwistPath(Path, kind="twist"):
         position = position + np.einsum("kd,kdi->ki", basis, integrals[k])
         return PathSamples(t, position, self._rotation(t), self._twist(t))
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`: with Ṙ = [ω]R, R is bounded by the exponential of ∫|ω|."""
+        """With Ṙ = [ω]R, R is bounded by the exponential of ∫|ω|."""
         k, _ = self._local(middle)
         share = 2.0 * half / np.diff(self._breaks)[k]
         segments = self._coefficients[k].transpose(1, 0, 2)

@@ -236,8 +236,9 @@ class Waypoints(Path, kind="waypoints"):
             raise FileFormatError(f"{file}: {error}") from error
 
     @property
+    @override
     def oriented(self) -> bool:
-        """See `Path.oriented`: where quaternions are given."""
+        """Where quaternions are given."""
         return self._oriented
 
     @property
@@ -246,8 +247,9 @@ class Waypoints(Path, kind="waypoints"):
         return read_only(self._t[self._bounds])
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`: the waypoints' times."""
+        """The waypoints' times."""
         return self._t
 
     @property
@@ -340,8 +342,9 @@ class Waypoints(Path, kind="waypoints"):
                 rotation[here], twist[here, 3:] = turned.at(own)
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`: cubics of positions and of rotation vectors, after the warp."""
+        """Cubics of positions and of rotation vectors, after the warp."""
         k, lasts, (first, *higher) = self._warps(middle)
         none = np.zeros_like(first)
         warp = np.stack([none, first, none, *higher]) * lasts
@@ -378,6 +381,7 @@ class Waypoints(Path, kind="waypoints"):
         }
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
-        """See `Saved.from_dict`: files say `quaternions`."""
+        """Files say `quaternions`."""
         return super().from_dict(of_file(values), **context)

@@ -101,8 +101,9 @@ class Weave(_InStep, kind="weave"):
                 f"expected {_MOST_SWINGS:,} at most; lengths are in metres"
             )
 
+    @override
     def at_constant_speed(self) -> Weave:
-        """See `Path.at_constant_speed`: as the seam, along which the swings stay where they are."""
+        """As the seam, along which the swings stay where they are."""
         return Weave(
             self._path.at_constant_speed(),
             self._amplitude,
@@ -117,8 +118,9 @@ class Weave(_InStep, kind="weave"):
         return round(float(self._lengths[1][-1]) / self._pitch)
 
     @cached_property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`: also where the shape of the swing goes on by another formula."""
+        """Also where the shape of the swing goes on by another formula."""
         breaks = np.array([1.0, self.swings - 1.0])
         if self._dwell:
             cycle = self._cycle[0][:-1]
@@ -142,8 +144,9 @@ class Weave(_InStep, kind="weave"):
         twist = np.hstack([seam.twist[:, :3] + turning + moving, seam.twist[:, 3:]])
         return PathSamples(t, seam.translation + beside * away[:, None], seam.rotation, twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`: p + R axis y(ψ(t))."""
+        """P + R axis y(ψ(t))."""
         known = path_series(self._path, middle, half)
         if known is None:
             return None

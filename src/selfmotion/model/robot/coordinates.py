@@ -122,8 +122,9 @@ class JointCoordinate(Coordinate):
         k = robot.joint_names.index(self.joint)
         return q[:, k], np.tile(np.eye(robot.dof)[k], (len(q), 1))
 
+    @override
     def series(self, chain: ChainSeries, q: Array) -> Array:
-        """See `Coordinate.series`: the joint's own."""
+        """Return the joint's own."""
         return np.asarray(chain.joints[chain.robot.joint_names.index(self.joint)])
 
 
@@ -225,8 +226,9 @@ class SwivelAngle(Coordinate):
         gradient = (cosine[:, None] * by_sine - sine[:, None] * by_cosine) / size
         return np.arctan2(sine, cosine), gradient
 
+    @override
     def series(self, chain: ChainSeries, q: Array) -> Array:
-        """See `Coordinate.series`: that of arg(C + iS) with |a|² = 1 multiplied out.
+        """Return that of arg(C + iS) with |a|² = 1 multiplied out.
 
         With l = W - S and L = |l|: S = L l·(r × e) and C = L² r·e - (l·r)(l·e). The logarithm of
         C + iS has a majorant where it keeps away from 0, and none near the stretched arm.

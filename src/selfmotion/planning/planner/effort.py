@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import (
     Counts,
@@ -87,8 +88,9 @@ class Deadline(Counts):
             return cls()
         return cls(end=time.perf_counter() + as_number(seconds, "deadline", above=0.0))
 
+    @override
     def evaluated(self) -> None:
-        """See `Counts.evaluated`; KeyboardInterrupt where the deadline has passed."""
+        """KeyboardInterrupt where the deadline has passed."""
         super().evaluated()
         self.check()
 

@@ -109,7 +109,7 @@ class Clearance(Constraint):
 
     @override
     def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`: the default one not to an arm without bodies."""
+        """Return whether the arm has bodies, for the default one; else True."""
         return self is not NO_OVERLAP or robot.urdf.has_collisions
 
     def model(self, robot: RobotModel) -> CollisionModel:

@@ -103,8 +103,9 @@ class EndVelocity(_EndRate, order=1, at_start=False):
 
     qd: npt.ArrayLike = 0.0
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Constraint.check`: a motion ends at rest only where its path does."""
+        """Require a path that ends at rest: a motion ends at rest only there."""
         if np.any(self.target(follows.robot)):
             return
         speed = float(np.abs(follows.twists(np.array([follows.duration]))).max())
@@ -130,8 +131,9 @@ class StartVelocity(_EndRate, order=1, at_start=True):
 
     qd: npt.ArrayLike = 0.0
 
+    @override
     def check_start(self, follows: Follows, start: Array | None) -> None:
-        """See `Constraint.check_start`: the tool's twist at the start has to be the path's."""
+        """Require that the tool's twist at the start is the path's."""
         robot = follows.robot
         if start is None:
             raise ProblemError("a start velocity needs a given start (start=)")
@@ -162,8 +164,9 @@ class StartAcceleration(_EndRate, order=2, at_start=True):
 
     qdd: npt.ArrayLike = 0.0
 
+    @override
     def check_start(self, follows: Follows, start: Array | None) -> None:
-        """See `Constraint.check_start`: of a free start no acceleration is known."""
+        """Of a free start no acceleration is known."""
         if start is None:
             raise ProblemError("a start acceleration needs a given start (start=)")
 
@@ -207,8 +210,9 @@ class ClosedPath(Constraint):
     def requirement(self, robot: RobotModel) -> ClosedMotion:
         return ClosedMotion(self.velocity)
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Constraint.check`: the tool's path has to be closed as well."""
+        """Require that the tool's path is closed as well."""
         for item in follows.items:
             path = item.path
             position, rotation = item.task.miss(path.pose(0.0), path.pose(path.duration))
@@ -218,6 +222,7 @@ class ClosedPath(Constraint):
                     f"{position:.3g} m and {rotation:.3g} rad from where it began"
                 )
 
+    @override
     def at_rest(self) -> ClosedPath:
-        """See `Constraint.at_rest`: both velocities are 0."""
+        """Both velocities are 0."""
         return ClosedPath(velocity=False)

@@ -142,7 +142,7 @@ class _RateLimits(Constraint):
 
     @override
     def remarks(self, robot: RobotModel) -> tuple[str, ...]:
-        """See `Constraint.remarks`: limits far above the arm's own, or any arm's, by joint."""
+        """Limits far above the arm's own, or any arm's, by joint."""
         if self.limit is None:
             return ()
         (unit, most), published = _MOST[self.order], self.published(robot)

@@ -56,13 +56,15 @@ class KineticEnergy(Cost):
     def value(self, samples: Samples) -> Array:
         return self.mu * self._energy.kinetic(samples.q, samples.qd)
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂G/∂q̇ = μMq̇ and ∂G/∂q = μ ½ q̇ᵀ ∂(Mq̇)/∂q."""
+        """∂G/∂q̇ = μMq̇ and ∂G/∂q = μ ½ q̇ᵀ ∂(Mq̇)/∂q."""
         by_q, by_qd = self._energy.kinetic_slopes(samples.q, samples.qd)
         return Partials(q=self.mu * by_q, qd=self.mu * by_qd)
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`: M in the middle of the joint limits."""
+        """M in the middle of the joint limits."""
         lower, upper = self.robot.finite_limits()
         return {1: self.mu * self._energy.mass(0.5 * (lower + upper))}
 
@@ -103,8 +105,9 @@ class GravityTorque(Cost):
     def value(self, samples: Samples) -> Array:
         return half_square(np.asarray(self.weight), Energy(self.robot).gravity(samples.q))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: (∂g/∂q)ᵀWg."""
+        """(∂g/∂q)ᵀWg."""
         energy = Energy(self.robot)
         torques = weighted(np.asarray(self.weight), energy.gravity(samples.q))
         return Partials(q=np.einsum("si,sij->sj", torques, energy.gravity_slopes(samples.q)))

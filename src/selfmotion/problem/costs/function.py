@@ -67,8 +67,9 @@ class FunctionCost(Cost):
             qd=self._difference(qd, lambda shifted: self._call(shifted, q, t)),
         )
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`: a file carries no function, only that there was one."""
+        """Return that there was a function: a file carries none."""
         return {"kind": LostCost.kind, "name": self.name, "was": self.kind}
 
     def _call(self, qd: Array, q: Array, t: Array) -> Array:

@@ -68,12 +68,14 @@ class _Derivative(_Quadratic):
     def value(self, samples: Samples) -> Array:
         return half_square(self._w, self._of(samples))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: Wx."""
+        """Wx."""
         return Partials(**{_DERIVATIVES[self._order]: weighted(self._w, self._of(samples))})
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`: W."""
+        """W."""
         return {self._order: weight_matrix(self._w, dof)}
 
     def _of(self, samples: Samples) -> Array:
@@ -114,8 +116,9 @@ class JointVelocity(_Derivative):
         return cls(weights**2, f"joint velocity (1 m as {metre:.3g} rad)")
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
-        """See `Saved.from_dict`: without a weight it is the usual one of the robot."""
+        """Without a weight it is the usual one of the robot."""
         robot = context.get("robot")
         if isinstance(robot, RobotModel) and "weight" not in values:
             usual = cls.usual(robot)
@@ -193,8 +196,9 @@ class Posture(_Quadratic):
     def value(self, samples: Samples) -> Array:
         return half_square(self._w, samples.q - np.asarray(self.posture))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: W(q - q*)."""
+        """W(q - q*)."""
         return Partials(q=weighted(self._w, samples.q - np.asarray(self.posture)))
 
     @override
@@ -338,8 +342,9 @@ class PathLength(Cost):
         lengths = np.hypot(samples.qd, self.smoothing) - self.smoothing
         return np.asarray(np.sum(self._w * lengths, axis=1))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: w_i q̇_i / √(q̇_i² + δ²)."""
+        """W_i q̇_i / √(q̇_i² + δ²)."""
         return Partials(qd=self._w * samples.qd / np.hypot(samples.qd, self.smoothing))
 
     @override

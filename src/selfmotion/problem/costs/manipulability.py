@@ -38,8 +38,9 @@ class InverseManipulability(Cost):
         with np.errstate(divide="ignore"):
             return np.asarray(self.mu / samples.gram_determinant)
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂G = -G ∂log det(JJᵀ)."""
+        """∂G = -G ∂log det(JJᵀ)."""
         return Partials(q=-self.value(samples)[:, None] * samples.log_determinant_gradient)
 
     @override
@@ -68,8 +69,9 @@ class Manipulability(Cost):
     def value(self, samples: Samples) -> Array:
         return -self.mu * np.sqrt(np.maximum(samples.gram_determinant, 0.0))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂w = ½ w ∂log det(JJᵀ)."""
+        """∂w = ½ w ∂log det(JJᵀ)."""
         return Partials(q=0.5 * self.value(samples)[:, None] * samples.log_determinant_gradient)
 
     @override
@@ -110,8 +112,9 @@ class DirectionalManipulability(Cost):
     def value(self, samples: Samples) -> Array:
         return np.asarray(self.mu * (self._solved(samples) @ np.asarray(self.direction)))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂G = -2μ ⟨a (Jᵀa)ᵀ, ∂J⟩ with a = (JJᵀ)⁻¹u."""
+        """∂G = -2μ ⟨a (Jᵀa)ᵀ, ∂J⟩ with a = (JJᵀ)⁻¹u."""
         a = self._solved(samples)
         back = np.einsum("sm,smn->sn", a, samples.task_jacobian)
         return Partials(q=samples.contract(-2.0 * self.mu * a[:, :, None] * back[:, None, :]))
@@ -158,8 +161,9 @@ class SmallestSingularValue(Cost):
         values = np.asarray(np.linalg.eigvalsh(samples.gram), dtype=np.float64)
         return np.asarray(self.mu * self._sum(values) ** (0.5 / self.power))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂ Σλ^-p = -2p ⟨(JJᵀ)^(-p-1) J, ∂J⟩ for the eigenvalues λ = σ²."""
+        """∂ Σλ^-p = -2p ⟨(JJᵀ)^(-p-1) J, ∂J⟩ for the eigenvalues λ = σ²."""
         values, vectors = np.linalg.eigh(samples.gram)
         scale = self.mu * self._sum(values) ** (0.5 / self.power - 1.0)
         powers = np.maximum(values, np.finfo(float).tiny) ** (-self.power - 1.0)

@@ -62,13 +62,15 @@ class LimitUse(Cost):
         by_rate = 0.5 * np.abs(rate / use[:, None] ** 2) ** (half - 1.0) * np.sign(rate)
         return Partials(qd=by_speed, qdd=by_rate / (a * use[:, None]))
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`: about, where half a limit is used."""
+        """About, where half a limit is used."""
         v, a = self._limits(dof)
         return {1: np.diag((self.power - 1.0) / v**2), 2: np.diag(0.5 * self.power / a**2)}
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`: the limits have to be the arm's."""
+        """Require that the limits are the arm's."""
         robot = follows.robot
         self._limits(robot.dof)
         if not np.isfinite(np.concatenate(self._limits(robot.dof))).any():
@@ -165,12 +167,14 @@ class OffPath(Cost):
     def value(self, samples: Samples) -> Array:
         return np.asarray(0.5 * self.weight * np.sum(_selected(samples) ** 2, axis=1))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂G/∂e = w SᵀS e."""
+        """∂G/∂e = w SᵀS e."""
         return Partials(error=self.weight * _selected(samples))
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`: w I on S e."""
+        """W I on S e."""
         return {ERROR: self.weight * np.eye(self.rows)}
 
 

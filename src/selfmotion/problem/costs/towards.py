@@ -62,19 +62,22 @@ class Towards(Cost):
         values, _ = self.coordinate(self.robot, samples.q)
         return 0.5 * self.weight * self.coordinate.away(values, self.target) ** 2
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: w (c - c*) ∂c/∂q."""
+        """W (c - c*) ∂c/∂q."""
         values, by_q = self.coordinate(self.robot, samples.q)
         return Partials(q=(self.weight * self.coordinate.away(values, self.target))[:, None] * by_q)
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`: in the middle of the joint limits."""
+        """In the middle of the joint limits."""
         lower, upper = self.robot.finite_limits()
         _, by_q = self.coordinate(self.robot, 0.5 * (lower + upper)[None])
         return {0: self.weight * np.outer(by_q[0], by_q[0])}
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`: the arm has to be the same."""
+        """Require the same arm."""
         robot = follows.robot
         if robot.joint_names != self.robot.joint_names:
             raise ProblemError(

@@ -232,7 +232,7 @@ class FeedSegment(PoseSegment):
     @property
     @override
     def curves(self) -> list[Curve]:
-        """See `Segment.curves`: its steps, with corners rounded in their zones, a smooth curve.
+        """Its steps, with corners rounded in their zones, a smooth curve.
 
         The one that the program states is the first.
         """
@@ -245,7 +245,7 @@ class FeedSegment(PoseSegment):
 
     @override
     def motions(self) -> Iterator[Knots]:
-        """See `Segment.motions`: with its ramps."""
+        """With its ramps."""
         times = self.ramps.times(self.evaluation_times())
         ends = np.linspace(0.0, self.ramps.each, _OF_RAMP)
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
@@ -255,7 +255,7 @@ class FeedSegment(PoseSegment):
 
     @override
     def reference(self, motion: Trajectory, first: float) -> Array:
-        """See `Segment.reference`: where the tool has gone as far."""
+        """Where the tool has gone as far."""
         travel = ArcLength.of_motion(self.frames, motion, first, first + self.seconds)
         shares = self._travel(self.evaluation_times()) / self.lengths[-1]
         return motion(np.clip(travel.when(shares * travel.whole), motion.t[0], motion.t[-1]))
@@ -343,7 +343,7 @@ class FeedSegment(PoseSegment):
 
     @override
     def spline(self, times: Array) -> Array:
-        """See `Segment.spline`: over the length of the path."""
+        """Over the length of the path."""
         from scipy.interpolate import CubicSpline
 
         rows: Array = CubicSpline(self.lengths, self.rows)(self._travel(times))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
@@ -69,8 +70,9 @@ _EVENT_TOLERANCE = 5e-4
 class FeedSection(PoseSection):
     """Section of a seam at a feed between two rests, to be written as poses with speeds."""
 
+    @override
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
-        """See `Section.segments`: one from rest to rest of the tool, the arm's self-motion aside.
+        """One from rest to rest of the tool, the arm's self-motion aside.
 
         With times where speeds do not do, and the segment says why.
         """

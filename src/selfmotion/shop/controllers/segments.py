@@ -361,7 +361,7 @@ class PoseSegment(Segment):
     @property
     @override
     def rows(self) -> Array:
-        """See `Segment.rows`: positions, quaternions and external axes, (K + 1, 7 + m)."""
+        """Positions, quaternions and external axes, (K + 1, 7 + m)."""
         own = self.q[:, np.argsort(self.order)]
         return np.hstack([self.positions, self.quaternions, own[:, self.frames.external]])
 

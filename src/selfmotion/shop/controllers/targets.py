@@ -71,8 +71,9 @@ class PoseSection(Section):
     min_density: ClassVar[float] = 0.02
     fewest: ClassVar[int] = 2
 
+    @override
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
-        """See `Section.segments`.
+        """Return the segments of a motion by poses.
 
         Raises
         ------
@@ -95,8 +96,9 @@ class PoseSection(Section):
             at = float(t[int(far.argmax())] - motion.t[0])
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
 
+    @override
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
-        """See `Section.thinned`.
+        """Return the one segment through as few poses as suffice.
 
         Raises
         ------
@@ -109,8 +111,9 @@ class PoseSection(Section):
             raise self._singular(self.first, allowed)
         return segment, deviation
 
+    @override
     def _target_times(self, allowed: Tolerance, fixed: Array) -> Array:
-        """See `Section._target_times`.
+        """Return times at which poses are written, (K,) [s].
 
         Raises
         ------
