@@ -25,7 +25,7 @@ from selfmotion.basics import (
     SelfmotionError,
 )
 from selfmotion.model.follow import completed, within_limits
-from selfmotion.model.motion import Grid, Sampling
+from selfmotion.model.motion import Grid, Sampling, Trajectory
 from selfmotion.model.path import Section
 from selfmotion.planning.formulation import Formulation, without_tolerances
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, broken_intervals
@@ -41,11 +41,15 @@ from selfmotion.planning.planner.solution import Solution, is_chain
 from selfmotion.planning.search import (
     LAST_SMOOTHINGS,
     Sequence,
+    SinglePoses,
     Stacked,
     asks_length,
     carried,
+    carried_within,
     guides,
+    inside,
     metrics,
+    pushed,
     shortest_along,
     start_candidates,
 )
@@ -88,12 +92,12 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
         ranking = _ranking(planner)
         if ranking.run(starts, finalists):
             ranked = ranking.ranked
-            _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+            _optimise_motions(planner, ranked)
             if planner.is_unmet and planner.incumbent is not None and not planner.is_over:
                 before = [motion.trajectory for motion in ranked]
                 before.append(planner.incumbent.evaluation.trajectory)
                 others = ranking.left_aside(before, finalists)
-                _optimise_each(planner, _resumed(planner, others), len(others))
+                _optimise_motions(planner, others)
             return
     elif len(starts) > finalists:
         starts = _best(planner.formulation, starts)[:finalists]
@@ -124,10 +128,33 @@ def optimise_where_it_breaks(
         starts = _drawn(formulation, planner, count, float(t[at]))
     except InverseKinematicsError:
         return
+    known = _pushed(planner, starts, t, at)[:finalists]
+    _optimise_each(planner, _guesses(planner, known), len(known))
     ranking = _ranking(planner)
-    if ranking.run(starts, finalists, at):
-        ranked = ranking.ranked
-        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+    if planner.is_unmet and ranking.run(starts, finalists, at):
+        _optimise_motions(planner, ranking.ranked)
+
+
+def _pushed(planner: Planner, starts: abc.Sequence[Array], t: Array, at: int) -> list[Trajectory]:
+    """Return motions at times t (N,) through free configurations at the time of number `at`.
+
+    Through those that bodies push others into: the starts, and the best motion. None where some
+    starts are free, which lead to motions as well.
+    """
+    from scipy.interpolate import CubicSpline
+
+    # Motions at their limits break them between nodes.
+    poses = inside(SinglePoses(planner.formulation, np.random.default_rng(0)))
+    q = np.array(starts)
+    if not poses.bounds.bodies or poses.bounds.keep(q).any():
+        return []
+    best, follows = planner.incumbent, planner.formulation.follows
+    if best is not None:
+        own = best.evaluation.trajectory(t[at : at + 1])[:, : follows.robot.dof]
+        q = np.concatenate([completed(follows, t[at : at + 1], own), q])
+    motions = carried_within(poses, pushed(poses, float(t[at]), q), t, at)
+    curves, names = [CubicSpline(t, motion) for motion in motions], follows.coordinates.names
+    return [Trajectory(t, curve(t), curve(t, 1), names, curve(t, 2)) for curve in curves]
 
 
 def may_stack(planner: Planner) -> bool:
@@ -159,7 +186,7 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
         ranking = _ranking(planner)
         ranking.run_along(found, t, finalists)
         ranked = ranking.ranked
-        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+        _optimise_motions(planner, ranked)
     return bool(len(found))
 
 
@@ -248,12 +275,16 @@ def _optimise_each(planner: Planner, guesses: Iterable[Guess], count: int) -> No
     planner.waiting = ()
 
 
-def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Guess]:
-    """Yield guesses near rough motions, lazily."""
-    for motion in rough:
+def _optimise_motions(planner: Planner, rough: abc.Sequence[NodeMotion]) -> None:
+    known = [motion.trajectory for motion in rough]
+    _optimise_each(planner, _guesses(planner, known), len(known))
+
+
+def _guesses(planner: Planner, motions: abc.Sequence[Trajectory]) -> Iterator[Guess]:
+    """Yield guesses near motions that are known, lazily."""
+    for known in motions:
         if planner.is_over:
             continue
-        known = motion.trajectory
         guess = planner.guess(known.q[0], free=planner.setup.is_free, motion=known)
         if guess is not None:
             yield guess

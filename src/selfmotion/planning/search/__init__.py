@@ -25,6 +25,12 @@ from selfmotion.planning.search.segments import (
     ChainSegments as ChainSegments,
     turned_towards as turned_towards,
 )
+from selfmotion.planning.search.single_poses import (
+    SinglePoses as SinglePoses,
+    carried_within as carried_within,
+    inside as inside,
+    pushed as pushed,
+)
 from selfmotion.planning.search.stacked import Stacked as Stacked, metrics as metrics
 from selfmotion.planning.search.starts import (
     carried as carried,

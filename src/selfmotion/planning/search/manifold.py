@@ -366,7 +366,7 @@ class OnPath:
     """
 
     def __init__(self, follows: Follows, t: Array, lower: Array, upper: Array) -> None:
-        self._follows, self._manifold = follows, Manifold(follows, lower, upper)
+        self.follows, self._manifold = follows, Manifold(follows, lower, upper)
         self._targets, self.count = follows.targets(t), len(t)
         self.robot, self.coordinates = follows.robot, follows.coordinates
         self._held, self.redundancy = follows.held(t), follows.redundancy
@@ -384,5 +384,5 @@ class OnPath:
 
         Each turned to the one before.
         """
-        jacobians = self._follows.jacobians(q)
+        jacobians = self.follows.jacobians(q)
         return carried(null_space(jacobians[0]), jacobians)

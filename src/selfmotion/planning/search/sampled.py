@@ -7,6 +7,7 @@ from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.search.chains import in_order, stations_of
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length
+from selfmotion.planning.search.pushing import Pushing
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.starts import spread
 from selfmotion.planning.search.vertices import Admissible
@@ -93,8 +94,15 @@ def _layers(
     near these: so there is a detour where smooth motions end.
     """
     smooth = _smooth_motions(waypoints, bounds, rng, progress)
-    turning = bounds.turning
-    layers, cost = [in_order(smooth[0][bounds.keep(smooth[0])])], np.empty(0)
+    turning, pushing = bounds.turning, Pushing(waypoints.follows, bounds)
+
+    def free(q: Array, i: int) -> Array:
+        selected = q[bounds.keep(q)]
+        # Where bodies leave little room, samples miss it.
+        found = selected if len(selected) else pushing.free(q, lambda x: waypoints.project(x, i))
+        return in_order(found)
+
+    layers, cost = [free(smooth[0], 0)], np.empty(0)
     for i in range(1, waypoints.count):
         progress("search: sampling waypoint", i + 1, waypoints.count)
         before = layers[-1]
@@ -106,7 +114,7 @@ def _layers(
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
         q, arrived = waypoints.project(guesses, i)
         q = np.concatenate([q[arrived], smooth[i]])
-        layers.append(in_order(q[bounds.keep(q)]))
+        layers.append(free(q, i))
         cost, _ = Length(weights).extended(
             i - 1, before, cost, layers[-1], largest_step[i - 1], turning
         )

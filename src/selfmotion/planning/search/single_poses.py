@@ -11,8 +11,9 @@ from selfmotion.model.follow import band_limits, within_limits
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
+from selfmotion.planning.search.pushing import Pushing
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
 from selfmotion.problem.problem import Problem
 
 # Branches of solutions that are followed from one pose to the next.
@@ -201,13 +202,43 @@ def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
     free, met = slowly[poses.bounds.keep(slowly)], np.concatenate([met, slowly])
     if len(free) or not len(met):
         return Found(free, met, tries)
-    for more in (_along_curves, _wandered, _climbed):
+    for more in (pushed, _along_curves, _wandered, _climbed):
         q = more(poses, t, met)
         free, met = q[poses.bounds.keep(q)], np.concatenate([met, q])
         tries += len(q)
         if len(free):
             break
     return Found(free, met, tries)
+
+
+def pushed(poses: SinglePoses, t: float, q: Array) -> Array:
+    """Return free configurations at t [s] that are reached from others there (K, n), (K', n)."""
+    return Pushing(poses.follows, poses.bounds).free(q, lambda x: poses.project(x, t))
+
+
+def inside(poses: SinglePoses) -> SinglePoses:
+    """Return the same with limits that are a little narrower."""
+    lower, upper = poses.bounds.lower, poses.bounds.upper
+    within = np.full(len(lower), AT_LIMIT)
+    n = poses.problem.robot.dof
+    # Those of tolerances are in units of their own.
+    within[n:] = AT_LIMIT * np.minimum(upper[n:], 1.0)
+    return poses.with_limits(lower + within, upper - within)
+
+
+def carried_within(poses: SinglePoses, q: Array, t: Array, at: int) -> Array:
+    """Return the motions without self-motion through q (K, n) at the time of number `at`.
+
+    From each of the times t (N,) [s] to the next, and back, within the limits: (K', N, n), of those
+    for which that is possible.
+    """
+    motions, going = np.empty((len(q), len(t), q.shape[1])), np.ones(len(q), dtype=bool)
+    motions[:, at] = q
+    for step, order in ((1, range(at + 1, len(t))), (-1, range(at - 1, -1, -1))):
+        for k in order:
+            motions[:, k], arrived = poses.project(motions[:, k - step], float(t[k]))
+            going &= arrived
+    return np.asarray(motions[going])
 
 
 def _along_curves(poses: SinglePoses, t: float, met: Array) -> Array:
