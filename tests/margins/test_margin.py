@@ -12,7 +12,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.collision import Separation
 from selfmotion.work.margins import least
-from selfmotion.work.margins.found import Displacement
+from selfmotion.work.margins.results import Displacement
 from support.arms import PANDA_HOME, robot_named
 from support.displaced import MISSED, Judge, random_displacement, worst_scale
 from support.shell import complaint, invoke
