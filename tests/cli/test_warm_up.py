@@ -36,7 +36,7 @@ def test_each_work_is_done_and_what_was_compiled_is_said(
     assert len(set(names)) == len(names)
     works = [(name, lambda name=name: done.append(name)) for name in names]
     monkeypatch.setattr(runs, "small_works", lambda: iter(works))
-    monkeypatch.setattr(runs, "companion", lambda _: other)
+    monkeypatch.setattr(runs, "compile_in_background", lambda _: other)
     code, printed = invoke("warm-up")
     assert code == 0
     assert done == names

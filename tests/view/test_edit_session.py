@@ -9,9 +9,9 @@ import selfmotion as sm
 from selfmotion.basics import FileFormatError, PlanError, ProblemError, RobotError
 from selfmotion.model.task import SE3
 from selfmotion.shell.view import EditSession
-from selfmotion.shell.view.found import Found, NewerRequest, Request
 from selfmotion.shell.view.motions import standing
 from selfmotion.shell.view.planning import Planning
+from selfmotion.shell.view.requests import NewerRequest, Outcome, Request
 from support.views import CIRCLE, Heard, moved, opened
 
 
@@ -274,11 +274,11 @@ def test_a_plan_that_nobody_waits_for_is_left(tmp_path):
     file = tmp_path / "circle.toml"
     file.write_text(CIRCLE)
     document = sm.basics.read_document(file)
-    found: list[Found] = []
+    found: list[Outcome] = []
     planning = Planning(file, False, found.append)
     newer = Request(2, document)
 
-    def take(one: Found) -> None:
+    def take(one: Outcome) -> None:
         found.append(one)
         if one.kind == "coarse":
             planning.ask(newer)

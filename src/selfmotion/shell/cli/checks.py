@@ -40,24 +40,24 @@ def requirements(
     With what `plan` keeps `usual`ly, accelerations and jerks of the arm's maker, and the arm
     `apart` from itself.
     """
-    asked: list[sm.constraints.Constraint] = []
+    constraints: list[sm.constraints.Constraint] = []
     if usual:
-        asked += [item for item in OF_MAKER if item.applies(robot)]
+        constraints += [item for item in OF_MAKER if item.applies(robot)]
     if velocity is not None:
         most = options.one_or_each(velocity, "--velocity")
-        asked.append(sm.constraints.JointVelocityLimits(most))
+        constraints.append(sm.constraints.JointVelocityLimits(most))
     if acceleration is not None:
         most = options.one_or_each(acceleration, "--acceleration")
-        asked.append(sm.constraints.JointAccelerationLimits(most))
+        constraints.append(sm.constraints.JointAccelerationLimits(most))
     if joint_limits is not None:
-        asked += read_joint_limits(joint_limits, robot)
+        constraints += read_joint_limits(joint_limits, robot)
     if obstacles is not None or clearance != 0.0 or srdf is not None or disabled:
         bodies = () if obstacles is None else options.read_obstacles(obstacles)
         pairs = tuple((one, other) for one, other in options.disabled_pairs(disabled))
-        asked.append(sm.constraints.Clearance(bodies, clearance, srdf, pairs))
+        constraints.append(sm.constraints.Clearance(bodies, clearance, srdf, pairs))
     elif apart and robot.urdf.has_collisions:
-        asked.append(NO_OVERLAP)
-    return tuple(item.requirement(robot) for item in asked)
+        constraints.append(NO_OVERLAP)
+    return tuple(item.requirement(robot) for item in constraints)
 
 
 class Read(NamedTuple):
@@ -72,8 +72,8 @@ class Read(NamedTuple):
 
     def ways(self, path: sm.paths.Path, robot: sm.RobotModel) -> list[sm.Trajectory]:
         """Return the motions that are judged along a path."""
-        found = [self.motion] if self.program is None else self.program.motions(path)
-        return [controllers.without_mimic_joints(motion, robot) for motion in found]
+        motions = [self.motion] if self.program is None else self.program.motions(path)
+        return [controllers.without_mimic_joints(motion, robot) for motion in motions]
 
     def besides(
         self, robot: sm.RobotModel, constraints: Sequence[sm.constraints.Constraint]
@@ -176,12 +176,12 @@ def of_plan(
     if calibration is not None:
         problem = on_calibrated(plan.problem, calibration)
         besides = requirements(problem.robot, *judged)
-        found = problem.certify(
+        certificate = problem.certify(
             plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
         )
         print_difference(problem.robot, plan.trajectory)
-        asked = (*problem.requirements, *besides)
-        return found, near(problem.robot, plan.trajectory, asked), problem.robot
+        all_requirements = (*problem.requirements, *besides)
+        return certificate, near(problem.robot, plan.trajectory, all_requirements), problem.robot
     besides = requirements(plan.robot, *judged)
     close = near(plan.robot, plan.trajectory, (*plan.requirements, *besides))
     if within is None and not any(judged):
@@ -203,9 +203,9 @@ def of_problem(
     And the program that it is.
     """
     problem, tolerance, ending, plan = _asked_by(Path(asked), progress)
-    given = read(file, degrees, within, problem.robot)
-    if plan is not None and given.program is None:
-        slower = controllers.slowed_as(plan, given.motion)
+    content = read(file, degrees, within, problem.robot)
+    if plan is not None and content.program is None:
+        slower = controllers.slowed_as(plan, content.motion)
         if slower is not plan:
             times = slower.trajectory.duration / plan.trajectory.duration
             text = (
@@ -214,8 +214,8 @@ def of_problem(
             )
             stages.print(text, markup=False, soft_wrap=True)
             problem = slower.problem
-    motions, program = given.ways(problem.path, problem.robot), given.program
-    against = given.besides(problem.robot, problem.constraints)
+    motions, program = content.ways(problem.path, problem.robot), content.program
+    against = content.besides(problem.robot, problem.constraints)
     if program is not None:
         problem = controllers.by_targets(problem)
         begin = motions[0].of_joints(problem.robot.joint_names).q[0]
@@ -226,7 +226,7 @@ def of_problem(
         problem = on_calibrated(problem, calibration)
         print_difference(problem.robot, motions[0])
     besides = requirements(problem.robot, *judged)
-    allowed, robot = given.within or tolerance, problem.robot
+    allowed, robot = content.within or tolerance, problem.robot
 
     def certify(motion: sm.Trajectory) -> sm.Certificate:
         return problem.certify(motion, allowed, ending, besides, progress)
@@ -257,11 +257,11 @@ def _asked_by(
 
 
 def near(
-    robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.certificate.Requirement]
+    robot: sm.RobotModel, motion: sm.Trajectory, requirements: Sequence[sm.certificate.Requirement]
 ) -> _Near:
     """Return how near each body comes."""
     return approaches(
-        asked, sm.certificate.FinishedMotion(robot, motion.of_joints(robot.joint_names))
+        requirements, sm.certificate.FinishedMotion(robot, motion.of_joints(robot.joint_names))
     )
 
 
@@ -273,13 +273,13 @@ def of_program(
         raise sm.errors.ProblemError(
             f"{file}: is no program of a controller, which {job} could judge"
         )
-    found = controllers.judged_program(file, sm.load_program(job), within)
-    steps, verified = found.steps, found.verified
+    judged = controllers.judged_program(file, sm.load_program(job), within)
+    steps, verified = judged.steps, judged.verified
     if as_json:
         data = {
             "verified": verified,
-            "verdict": found.verdict,
-            "failures": list(found.failures),
+            "verdict": judged.verdict,
+            "failures": list(judged.failures),
             "steps": [step._asdict() for step in steps],
         }
         print_json(data)
@@ -288,5 +288,5 @@ def of_program(
             style = None if step.verified else "bold red"
             text = f"{step.name}: {step.verdict}"
             terminal.print(text, style=style, markup=False, soft_wrap=True)
-        terminal.print(found.verdict, markup=False, soft_wrap=True)
+        terminal.print(judged.verdict, markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)

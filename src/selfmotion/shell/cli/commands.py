@@ -66,26 +66,30 @@ def plan(
     outputs.check_own(job.outputs, problem, force)
     if job.goal != "parts":
         outputs.check_suffixes([*job.outputs, *(out or [])])
-    asked = {
+    choices = {
         "max_evaluations": max_evaluations,
         "search": options.search_of(search, compare, job.search),
         "deadline": deadline,
     }
-    given = {key: value for key, value in asked.items() if value is not None}
+    chosen = {key: value for key, value in choices.items() if value is not None}
     remarks = job.remarks
     outputs.print_notes(remarks)
     job.check_used(job.goal)
     if job.goal == "parts":
-        options.refuse_unused({"from": warm, **given}, "a motion in parts")
+        options.refuse_unused({"from": warm, **chosen}, "a motion in parts")
         jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json, verbose)
     if job.goal == "fastest":
-        options.refuse_unused({"from": warm, **given}, "the fastest motion")
+        options.refuse_unused({"from": warm, **chosen}, "the fastest motion")
         result = fastest_with_progress(job).plan
     elif job.goal == "retimed":
-        found = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
-        result = sm.retime(found)
+        planned = plan_with_progress(
+            job.problem, warm_start=warm_start, **{**job.settings, **chosen}
+        )
+        result = sm.retime(planned)
     else:
-        result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
+        result = plan_with_progress(
+            job.problem, warm_start=warm_start, **{**job.settings, **chosen}
+        )
     outputs.finish(result, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks)
 
 
@@ -186,23 +190,23 @@ def check(
     One made elsewhere by what plan keeps: limits of the arm and of its maker, and self-collision.
     """
     # With their types, those of the signature; options of the path are the context's alone.
-    asked = judging.Asked(file, context.params | locals())
-    asked.refuse_others()
-    if asked.is_job:
+    request = judging.Asked(file, context.params | locals())
+    request.refuse_others()
+    if request.is_job:
         jobs.check(file, as_json, verbose)
-    if asked.is_of_program:
-        checks.of_program(file, Path(robot or ""), asked.within, as_json, verbose)
+    if request.is_of_program:
+        checks.of_program(file, Path(robot or ""), request.within, as_json, verbose)
     with StageDisplay(stages) as display:
-        found = asked.judged(display.stage)
-    outputs.print_notes(found.notes)
+        judged = request.judged(display.stage)
+    outputs.print_notes(judged.notes)
     if as_json:
-        data = summaries.certificate_json(found.certificate, found.near)
-        data["remarks"] = [*found.notes, *data["remarks"]]
-        print_json(data | checks.left_to_controller(found.program))
+        data = summaries.certificate_json(judged.certificate, judged.near)
+        data["remarks"] = [*judged.notes, *data["remarks"]]
+        print_json(data | checks.left_to_controller(judged.program))
     else:
-        outputs.show_certificate(found.certificate, found.near, found.arm, verbose)
-        checks.print_controller_note(found.program)
-    raise typer.Exit(VERIFIED if found.certificate.verified else NOT_VERIFIED)
+        outputs.show_certificate(judged.certificate, judged.near, judged.arm, verbose)
+        checks.print_controller_note(judged.program)
+    raise typer.Exit(VERIFIED if judged.certificate.verified else NOT_VERIFIED)
 
 
 @app.command(epilog="Example: selfmotion compare a.npz b.npz", rich_help_panel=LOOK)
@@ -220,14 +224,14 @@ def compare(
     """Compare plans: costs, durations, margins and verdicts, side by side."""
     saved = {str(file): sm.load_plan(file) for file in plans}
     robots = [plan.robot for plan in saved.values()]
-    found = sm.compare(saved, costs=documents.costs_of(cost, robots[0]) if cost else None)
+    table = sm.compare(saved, costs=documents.costs_of(cost, robots[0]) if cost else None)
     if as_json:
         told = {name: summaries.plan_json(plan) for name, plan in saved.items()}
         for number, data in enumerate(told.values() if cost else ()):
-            data["measured"] = {name: each[number] for name, each in found.costs.items()}
+            data["measured"] = {name: each[number] for name, each in table.costs.items()}
         print_json(told)
     else:
-        tables.show_comparison(found, terminal)
+        tables.show_comparison(table, terminal)
 
 
 @app.command(
@@ -367,23 +371,24 @@ def fastest(
     job = documents.of_file(Path(problem), settings or [], allow_code)
     outputs.check_own(job.outputs, problem, force)
     outputs.check_suffixes([*job.outputs, *(out or [])])
-    given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
+    limits = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
     if keep:
         pairs = [_factor(text) for text in keep]
         options.refuse_twice("--keep", [kind for kind, _ in pairs])
-        given["keep"] = {**(job.keep or {}), **dict(pairs)}
+        limits["keep"] = {**(job.keep or {}), **dict(pairs)}
     remarks = job.remarks
     outputs.print_notes(remarks)
-    found = fastest_with_progress(job, deadline=deadline, **given)
+    planned = fastest_with_progress(job, deadline=deadline, **limits)
     if not as_json:
         stages.print(
-            f"{found.duration:.4g} s; lowest cost, retimed: {_time(found.retimed)}, "
-            f"minimum-norm motion retimed: {_time(found.pseudo_inverse)}; {found.status.message}",
+            f"{planned.duration:.4g} s; lowest cost, retimed: {_time(planned.retimed)}, "
+            f"minimum-norm motion retimed: {_time(planned.pseudo_inverse)}; "
+            f"{planned.status.message}",
             markup=False,
             soft_wrap=True,
         )
     outputs.finish(
-        found.plan, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks
+        planned.plan, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks
     )
 
 

@@ -90,9 +90,9 @@ def job(
     with basics.held_interruption():
         work = documents.seams_of_file(file, changes or [], allow_code)
         earlier = None if before is None else sm.load_program(before)
-        asked = None if settings is None else sm.files.read_program_settings(settings)
+        program_settings = None if settings is None else sm.files.read_program_settings(settings)
         # Before anything is planned.
-        _check_programs(work, wanted, asked)
+        _check_programs(work, wanted, program_settings)
         remarks = work.remarks
     outputs.print_notes(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
@@ -100,7 +100,7 @@ def job(
     if work.at_feed is not None and not as_json:
         _print_feed(program)
     _show(program, as_json, verbose, remarks)
-    _write_wanted(program, wanted, asked, as_json)
+    _write_wanted(program, wanted, program_settings, as_json)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 
@@ -128,12 +128,12 @@ def _check_wanted(wanted: Sequence[Path], settings: Path | None) -> None:
 
 
 def _check_programs(
-    work: SeamJob, wanted: Sequence[Path], asked: sm.files.ProgramSettings | None
+    work: SeamJob, wanted: Sequence[Path], program_settings: sm.files.ProgramSettings | None
 ) -> None:
     """Raise where a controller's program could not be written of a job."""
-    if asked is None and not any(_switches(target) for target in wanted):
+    if program_settings is None and not any(_switches(target) for target in wanted):
         return
-    settings = asked or sm.files.ProgramSettings()
+    settings = program_settings or sm.files.ProgramSettings()
     happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
     controllers.check_signals(happens, settings)
     for target in wanted:
@@ -151,7 +151,7 @@ def _print_feed(program: sm.Program) -> None:
 def _write_wanted(
     program: sm.Program,
     wanted: Sequence[Path],
-    asked: sm.files.ProgramSettings | None,
+    settings: sm.files.ProgramSettings | None,
     as_json: bool,
 ) -> None:
     """Write a program into all files, but those that a motion with gaps has no place in."""
@@ -162,9 +162,9 @@ def _write_wanted(
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
             outputs.print_left_out(target, terminal, unsound, quiet=as_json)
             continue
-        of_stream = asked is not None and not asked.by_poses
+        of_stream = settings is not None and not settings.by_poses
         streamed = of_stream and has_targets and target.suffix.lower() == ".script"
-        write_program(program, target, asked.streamed if asked and streamed else asked)
+        write_program(program, target, settings.streamed if settings and streamed else settings)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
             outputs.print_large(target, terminal)
@@ -172,10 +172,10 @@ def _write_wanted(
 
 def _check(file: Path) -> None:
     if not (file.suffix in (PROGRAM, ".html", *controllers.SUFFIXES) or _is_timetable(file)):
-        known = ", ".join(controllers.SUFFIXES)
+        suffixes = ", ".join(controllers.SUFFIXES)
         raise sm.errors.FileFormatError(
             f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
-            f"({known})"
+            f"({suffixes})"
         )
 
 
@@ -201,9 +201,9 @@ def write_program(
 
         write_replay(program, file)
     else:
-        own = settings if _switches(file) else None
+        used = settings if _switches(file) else None
         with StageDisplay(stages) as display:
-            sm.files.write_motion(program, file, settings=own, progress=display.stage)
+            sm.files.write_motion(program, file, settings=used, progress=display.stage)
 
 
 def finish_parts(
@@ -213,30 +213,31 @@ def finish_parts(
     wanted = [*job.outputs, *out]
     for file in wanted:
         if file.suffix not in (PARTS, ".html", *controllers.SUFFIXES):
-            known = ", ".join(controllers.SUFFIXES)
+            suffixes = ", ".join(controllers.SUFFIXES)
             raise sm.errors.FileFormatError(
-                f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
+                f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion "
+                f"({suffixes})"
             )
     with StageDisplay(stages) as display:
-        found = job.in_parts(progress=display.stage)
-    _show_parts(found, as_json, verbose, job.remarks)
+        parts = job.in_parts(progress=display.stage)
+    _show_parts(parts, as_json, verbose, job.remarks)
     for file in wanted:
-        unsound = outputs.left_out(found)
+        unsound = outputs.left_out(parts)
         if unsound and outputs.is_motion(file):
             outputs.print_left_out(file, terminal, unsound, quiet=as_json)
             continue
         if file.suffix == PARTS:
-            found.save(file)
+            parts.save(file)
         elif file.suffix == ".html":
             from selfmotion.shell.replay import write_replay
 
-            write_replay(found, file)
+            write_replay(parts, file)
         else:
-            sm.files.write_motion(found, file)
+            sm.files.write_motion(parts, file)
         if not as_json:
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
             outputs.print_large(file, terminal)
-    raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
+    raise typer.Exit(VERIFIED if parts.verified else NOT_VERIFIED)
 
 
 def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:

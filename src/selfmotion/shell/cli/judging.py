@@ -77,10 +77,10 @@ class Asked:
         """Options that say what the motion is of, by their names; None where they are not given."""
         typed = {name: self.given[name] for name in ("path", *documents.OF_PATH)}
         typed["flip_normals"] = typed["flip_normals"] or None
-        own = {name.replace("_", "-"): value for name, value in typed.items()}
-        own |= {name: self.given[name] for name in ("task", "tool", "reference")}
-        own |= {name: self.given[name] or None for name in ("lock", "argument", "packages")}
-        return own | {"no-self-collision": self.given["no_collision"] or None}
+        options = {name.replace("_", "-"): value for name, value in typed.items()}
+        options |= {name: self.given[name] for name in ("task", "tool", "reference")}
+        options |= {name: self.given[name] or None for name in ("lock", "argument", "packages")}
+        return options | {"no-self-collision": self.given["no_collision"] or None}
 
     def refuse_others(self) -> None:
         """Raise ProblemError for options that have no effect, since a file says it."""
@@ -136,21 +136,23 @@ class Asked:
             packages=given["packages"] or (),
             calibration=given["calibration"],
         )
-        found = checks.read(file, given["degrees"], self.within, arm)
+        read = checks.read(file, given["degrees"], self.within, arm)
         # Accelerations of a program are the controller's.
-        asked = checks.requirements(
-            arm, *self._limits, usual=found.program is None, apart=not given["no_collision"]
+        requirements = checks.requirements(
+            arm, *self._limits, usual=read.program is None, apart=not given["no_collision"]
         )
         followed = documents.followed(given["path"], given, arm)
         task = given["task"] or "pose"
 
         def certify(motion: sm.Trajectory) -> sm.Certificate:
-            return sm.certify(arm, followed, task, motion, found.within, asked, progress=progress)
+            return sm.certify(
+                arm, followed, task, motion, read.within, requirements, progress=progress
+            )
 
-        certificate, motion = controllers.judged_interpolations(found.ways(followed, arm), certify)
-        certificate = checks.with_failures(certificate, found.besides(arm, ()))
+        certificate, motion = controllers.judged_interpolations(read.ways(followed, arm), certify)
+        certificate = checks.with_failures(certificate, read.besides(arm, ()))
         notes = (*self._notes(arm), *arm.urdf.notes, *followed.notes)
-        return Judged(certificate, checks.near(arm, motion, asked), arm, found.program, notes)
+        return Judged(certificate, checks.near(arm, motion, requirements), arm, read.program, notes)
 
     def _notes(self, arm: sm.RobotModel) -> tuple[str, ...]:
         given = self.given

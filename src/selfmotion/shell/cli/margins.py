@@ -75,36 +75,36 @@ def margin(
     """Measure by how much part, tool and base may be displaced before a plan fails."""
     within = _process(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
-    asked: dict[str, Any] = {"clearance": clearance, "center": about}
-    asked |= {"part": part or None, "tool": tool or None}
+    margin_options: dict[str, Any] = {"clearance": clearance, "center": about}
+    margin_options |= {"part": part or None, "tool": tool or None}
     if file.suffix == ".program":
         if corrected:
             raise sm.errors.ProblemError("--corrected is of a single plan (.npz); leave it out")
-        _margins_of_seams(sm.load_program(file), within, asked, as_json)
+        _margins_of_seams(sm.load_program(file), within, margin_options, as_json)
         return
     plan = sm.load_plan(file)
     with StageDisplay(stages) as display:
         display.stage("measuring margins", 1, 1)
-        found = sm.margin(plan, within, **asked)
+        margins = sm.margin(plan, within, **margin_options)
     again, refused = [], dict[str, str]()
     if about is not None:
         # Margins have it in the frame of the path, corrections in world axes.
         about = plan.problem.follows.items[0].chain.base_placement.act(np.array(about))
     for of in ("part", "base") if corrected else ():
-        given: dict[str, Any] = {"part": part or None, "center": about} if of == "part" else {}
+        moved_body: dict[str, Any] = {"part": part or None, "center": about} if of == "part" else {}
         try:
             with StageDisplay(stages) as display:
-                again.append(sm.correction(plan, of=of, progress=display.stage, **given))
+                again.append(sm.correction(plan, of=of, progress=display.stage, **moved_body))
         except sm.errors.ProblemError as error:
             # The other one may have an answer all the same.
             refused[of] = str(error)
     if as_json:
         planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
         planned |= {of: {"refused": why} for of, why in refused.items()}
-        print_json(margins_json(found) | {"corrected": planned})
+        print_json(margins_json(margins) | {"corrected": planned})
         return
     whys = (f"not planned again for another place of the {of}: {refused[of]}" for of in refused)
-    for told in (found, *again, *whys):
+    for told in (margins, *again, *whys):
         terminal.print(str(told), markup=False, soft_wrap=True)
 
 
@@ -153,20 +153,20 @@ def sheet(
 ) -> None:
     """Write a process sheet: motion, limits kept and margins, to print on A4."""
     within = _process(tolerance, turn)
-    found: sm.margins.Margins | dict[str, sm.margins.Margins] | None = None
+    margins: sm.margins.Margins | dict[str, sm.margins.Margins] | None = None
     planned: sm.Plan | sm.Program
     if file.suffix == ".program":
         planned = sm.load_program(file)
-        known = {name: plan for name, plan in planned.plans.items() if _has_margins(plan, within)}
-        found = _measured(known, within, {"part": part or None})
+        plans = {name: plan for name, plan in planned.plans.items() if _has_margins(plan, within)}
+        margins = _measured(plans, within, {"part": part or None})
     else:
         planned = sm.load_plan(file)
         if _has_margins(planned, within):
             with StageDisplay(stages) as display:
                 display.stage("measuring margins", 1, 1)
-                found = sm.margin(planned, within, part=part or None)
+                margins = sm.margin(planned, within, part=part or None)
     written = sm.files.write_sheet(
-        planned, out, found, title=title, part_number=part_number, order_number=order_number
+        planned, out, margins, title=title, part_number=part_number, order_number=order_number
     )
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
 
@@ -178,26 +178,26 @@ def _has_margins(plan: sm.Plan, within: sm.Tolerance | None) -> bool:
 
 
 def _measured(
-    plans: Mapping[str, sm.Plan], within: sm.Tolerance | None, asked: Mapping[str, Any]
+    plans: Mapping[str, sm.Plan], within: sm.Tolerance | None, options: Mapping[str, Any]
 ) -> dict[str, sm.margins.Margins]:
     """Return the margins of plans of seams, by their names."""
-    found = {}
+    margins = {}
     with StageDisplay(stages) as display:
         for number, (name, plan) in enumerate(plans.items(), 1):
             display.stage(f"measuring margins of seam '{name}'", number, len(plans))
-            found[name] = sm.margin(plan, within, **asked)
-    return found
+            margins[name] = sm.margin(plan, within, **options)
+    return margins
 
 
 def _margins_of_seams(
-    program: sm.Program, within: sm.Tolerance | None, asked: Mapping[str, Any], as_json: bool
+    program: sm.Program, within: sm.Tolerance | None, options: Mapping[str, Any], as_json: bool
 ) -> None:
     """Print the margins of each seam; those of moves are not known."""
-    found = _measured(program.plans, within, asked)
+    margins = _measured(program.plans, within, options)
     if as_json:
-        print_json({"seams": {name: margins_json(it) for name, it in found.items()}})
+        print_json({"seams": {name: margins_json(it) for name, it in margins.items()}})
         return
-    for name, each in found.items():
+    for name, each in margins.items():
         terminal.print(f"seam '{name}': {each}\n", markup=False, soft_wrap=True)
     terminal.print("not judged: the moves between the seams", markup=False, soft_wrap=True)
 
@@ -209,9 +209,9 @@ def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None
     return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
 
 
-def margins_json(found: sm.margins.Margins) -> dict[str, Any]:
+def margins_json(margins: sm.margins.Margins) -> dict[str, Any]:
     """Return margins as JSON-safe values, the sentence first."""
-    return {"sentence": found.sentence, **_plain(dataclasses.asdict(found))}
+    return {"sentence": margins.sentence, **_plain(dataclasses.asdict(margins))}
 
 
 def _plain(value: Any) -> Any:
@@ -249,13 +249,13 @@ def plan_margin(
     outputs.check_suffixes(out or [])
     problem = documents.of_file(file, settings or [], allow_code).problem
     with StageDisplay(stages) as display:
-        found = sm.plan_with_margin(
+        planned = sm.plan_with_margin(
             problem,
             sm.Margin(position, rotation),
             of=of or "part",
             part=part or None,
             progress=display.stage,
         )
-    terminal.print(str(found), markup=False, soft_wrap=True)
-    outputs.write(found.plan, out or [], None, terminal, quiet=False)
-    raise typer.Exit(VERIFIED if found.reached else NOT_VERIFIED)
+    terminal.print(str(planned), markup=False, soft_wrap=True)
+    outputs.write(planned.plan, out or [], None, terminal, quiet=False)
+    raise typer.Exit(VERIFIED if planned.reached else NOT_VERIFIED)

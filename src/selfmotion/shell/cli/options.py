@@ -388,7 +388,7 @@ def relaxation(text: str) -> sm.Relaxation:
     rows, _, band = rest.partition("=")
     try:
         first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
-        found = sm.Relaxation(
+        item = sm.Relaxation(
             tuple(rows.split(",")),
             float(band) if band else np.inf,
             (first, last) if window else None,
@@ -397,7 +397,7 @@ def relaxation(text: str) -> sm.Relaxation:
         raise sm.errors.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
-    return found
+    return item
 
 
 def search_of(
@@ -440,7 +440,7 @@ def locks(texts: list[str] | None) -> dict[str, float]:
 
 def arguments(texts: list[str] | None) -> dict[str, str]:
     """Return what --argument describes."""
-    found = {}
+    values = {}
     refuse_twice("--argument", [text.partition("=")[0] for text in texts or []])
     for text in texts or []:
         name, mark, value = text.partition("=")
@@ -448,8 +448,8 @@ def arguments(texts: list[str] | None) -> dict[str, str]:
             raise sm.errors.RobotError(
                 f"--argument is '{text}', expected NAME=VALUE like prefix=left_"
             )
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 def refuse_twice(option: str, names: list[str]) -> None:
@@ -459,16 +459,16 @@ def refuse_twice(option: str, names: list[str]) -> None:
         raise sm.errors.ProblemError(f"{option} says '{twice}' twice; say it once")
 
 
-def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
+def refuse(options: dict[str, Any], file: Path | str, whose: str) -> None:
     """Raise ProblemError for an option that what is checked says itself."""
-    for name, value in given.items():
+    for name, value in options.items():
         if value is not None:
             raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
-def refuse_unused(given: dict[str, Any], what: str) -> None:
+def refuse_unused(options: dict[str, Any], what: str) -> None:
     """Raise ProblemError for an option that has no effect on what is planned."""
-    for name, value in given.items():
+    for name, value in options.items():
         if value is not None:
             option = name.replace("_", "-")
             raise sm.errors.ProblemError(f"--{option} has no effect on {what}: leave it out")
@@ -476,8 +476,8 @@ def refuse_unused(given: dict[str, Any], what: str) -> None:
 
 def one_or_each(text: str, option: str) -> list[float] | float:
     """Return one number, or one for each joint."""
-    found: list[float] = numbers(text, option).tolist()
-    return found[0] if len(found) == 1 else found
+    values: list[float] = numbers(text, option).tolist()
+    return values[0] if len(values) == 1 else values
 
 
 def pose(text: str, option: str) -> dict[str, Any]:
@@ -494,13 +494,13 @@ def pose(text: str, option: str) -> dict[str, Any]:
 
 def read_obstacles(file: Path) -> tuple[sm.obstacles.Obstacle, ...]:
     """Return the obstacles of a file; see `obstacle_tables`."""
-    found = []
+    obstacles = []
     for k, item in enumerate(obstacle_tables(file)):
         try:
-            found.append(documents.obstacle(item, lambda name: Path(name)))
+            obstacles.append(documents.obstacle(item, lambda name: Path(name)))
         except sm.SelfmotionError as error:
             raise sm.errors.FileFormatError(f"{file}: [{k}]: {error}") from error
-    return tuple(found)
+    return tuple(obstacles)
 
 
 def obstacle_tables(file: Path) -> list[dict[str, Any]]:
@@ -513,16 +513,16 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
         raise sm.errors.FileFormatError(
             f"{file}: expected a list of obstacles, each a table of values"
         )
-    found = [basics.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
-    for item in found:
+    tables = [basics.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
+    for item in tables:
         if isinstance(item.get("file"), str):
             item["file"] = str(file.parent / item["file"])
-    return found
+    return tables
 
 
 def _listed(file: Path) -> Any:
-    found = basics.read_values(file)
-    return found.get("obstacles") if isinstance(found, dict) else found
+    content = basics.read_values(file)
+    return content.get("obstacles") if isinstance(content, dict) else content
 
 
 def disabled_pairs(texts: Sequence[str] | None) -> list[list[str]]:

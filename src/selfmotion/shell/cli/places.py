@@ -74,24 +74,24 @@ def place(
     Of a job all seams are placed together, and a job file is written. What stands in the frame of
     a file's workpiece belongs to the part.
     """
-    asked = _Asked(tuple(files), tuple(out or ()), base, part, path_alone, tuple(settings or ()))
-    asked.check(drawn or [])
-    read = asked.documents()
-    job = asked.job(read, allow_code)
-    problems = asked.problems(allow_code) if job is None else list(job.problems)
+    request = _Asked(tuple(files), tuple(out or ()), base, part, path_alone, tuple(settings or ()))
+    request.check(drawn or [])
+    read = request.documents()
+    job = request.job(read, allow_code)
+    problems = request.problems(allow_code) if job is None else list(job.problems)
     within = _within({"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw})
-    given = asked.moving(read, center)
+    move_options = request.moving(read, center)
     if job is not None and out:
-        _check_moved_bodies(files[0], read[0], job, given.get("part", ()))
-    found = _placed(workers, problems, within, deadline=deadline, **given)
-    terminal.print(str(found), markup=False, soft_wrap=True)
+        _check_moved_bodies(files[0], read[0], job, move_options.get("part", ()))
+    placement = _placed(workers, problems, within, deadline=deadline, **move_options)
+    terminal.print(str(placement), markup=False, soft_wrap=True)
     for file in out or []:
         if job is None:
-            _write(found, file)
+            _write(placement, file)
         else:
-            _write_job(found, read[0], problems[0], file)
+            _write_job(placement, read[0], problems[0], file)
     if drawn:
-        _draw(found, drawn, found.map(points=points) if len(within) > 1 else None)
+        _draw(placement, drawn, placement.map(points=points) if len(within) > 1 else None)
 
 
 def _within(named: Mapping[str, str | None]) -> dict[str, Any]:
@@ -138,10 +138,10 @@ class _Asked:
                 "--part and --path-alone say different things; give one of them"
             )
         for file in [*self.out, *drawn]:
-            known = (*_PROBLEM_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
-            if file.suffix not in known:
+            suffixes = (*_PROBLEM_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
+            if file.suffix not in suffixes:
                 raise sm.errors.FileFormatError(
-                    f"{file}: expected a name that ends in {', '.join(known)}"
+                    f"{file}: expected a name that ends in {', '.join(suffixes)}"
                 )
 
     def documents(self) -> list[Mapping[str, Any]]:
@@ -171,32 +171,32 @@ class _Asked:
             for file, document in zip(self.files, read, strict=True):
                 _check_stands(file, document)
         known_parts = [names for names in map(belonging, read) if names is not None]
-        given: dict[str, Any] = {"of": "base" if self.base else "part"}
+        move_options: dict[str, Any] = {"of": "base" if self.base else "part"}
         if self.part or self.path_alone:
-            given["part"] = self.part or ()
+            move_options["part"] = self.part or ()
         elif known_parts and not self.base:
-            given["part"] = sorted({name for names in known_parts for name in names})
+            move_options["part"] = sorted({name for names in known_parts for name in names})
         if center is not None:
-            given["center"] = options.numbers(center, "--center", 3)
-        return given
+            move_options["center"] = options.numbers(center, "--center", 3)
+        return move_options
 
 
 def _write_job(
-    found: sm.placement.Placement, document: Mapping[str, Any], problem: sm.Problem, file: Path
+    placement: sm.placement.Placement, document: Mapping[str, Any], problem: sm.Problem, file: Path
 ) -> None:
     """Write the document of a job with its workpiece moved to the place."""
     # Paths are in the frame of the reference, which need not be the world.
     frame = problem.follows.items[0].chain.base_placement
-    by = frame.inverse() * found.displacement * frame
+    by = frame.inverse() * placement.displacement * frame
     write_document(file, moved_workpiece(document, by))
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
-def _draw(found: sm.placement.Placement, drawn: Sequence[Path], pictured: Any) -> None:
+def _draw(placement: sm.placement.Placement, drawn: Sequence[Path], pictured: Any) -> None:
     """Write maps of places, as pages or pictures; of one coordinate there is no picture."""
     for file in drawn:
         if file.suffix == ".html":
-            sm.files.write_placement(found, file, pictured)
+            sm.files.write_placement(placement, file, pictured)
         elif pictured is None:
             raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
         else:
@@ -233,16 +233,16 @@ def _check_moved_bodies(
     file: Path, document: Mapping[str, Any], job: SeamJob, part: Sequence[str]
 ) -> None:
     """Raise where moving its workpiece would not move what was placed of a job."""
-    own = belonging(document) or ()
-    if set(part) != set(own):
+    own_bodies = belonging(document) or ()
+    if set(part) != set(own_bodies):
         raise sm.errors.ProblemError(
             f"{file}: a job is written at its place with its [workpiece] moved, to which belongs "
-            f"{', '.join(own) or 'no obstacle'}, not {', '.join(part) or 'nothing'}; have in "
-            f"workpiece.obstacles what moves along, or leave out --out"
+            f"{', '.join(own_bodies) or 'no obstacle'}, not {', '.join(part) or 'nothing'}; "
+            f"have in workpiece.obstacles what moves along, or leave out --out"
         )
     frame = job.problems[0].follows.items[0].chain.base_placement
     is_on = (document.get("workpiece") or {}).get("on") is not None
-    bodies = own or any(seam.leaves for seam in job.seams)
+    bodies = own_bodies or any(seam.leaves for seam in job.seams)
     if bodies and not is_on and not frame.isIdentity(1e-9):
         raise sm.errors.ProblemError(
             f"{file}: paths are in the frame of '{job.robot.reference}', bodies of the workpiece "
@@ -251,10 +251,10 @@ def _check_moved_bodies(
         )
 
 
-def _write(found: sm.placement.Placement, file: Path) -> None:
+def _write(placement: sm.placement.Placement, file: Path) -> None:
     """Write the problems or plans of a place, numbered where they are several."""
-    several = len(found.plans) > 1
-    for number, plan in enumerate(found.plans):
+    several = len(placement.plans) > 1
+    for number, plan in enumerate(placement.plans):
         named = file.with_stem(f"{file.stem}-{number}") if several else file
         if named.suffix == ".npz":
             plan.save(named)

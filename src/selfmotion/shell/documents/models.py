@@ -148,8 +148,8 @@ _FUNCTION: _Fields = {
 def document_model() -> type[BaseModel]:
     """Return the model of a problem file, with every class that is known by now."""
     families = (Path, NullMotion, Cost, Constraint)
-    known = (cls for family in families for cls in family.kinds().values())
-    return _document_model((*known, *(cls for _, cls in obstacle_shapes())))
+    kinds = (cls for family in families for cls in family.kinds().values())
+    return _document_model((*kinds, *(cls for _, cls in obstacle_shapes())))
 
 
 def path_model() -> type[BaseModel]:
@@ -158,7 +158,7 @@ def path_model() -> type[BaseModel]:
 
 
 @lru_cache(maxsize=1)
-def _path_model(known: tuple[type, ...]) -> type[BaseModel]:
+def _path_model(kinds: tuple[type, ...]) -> type[BaseModel]:
     return _model("Inner", {"path": (_tool_motion(), ...)})
 
 
@@ -173,7 +173,7 @@ def _tool_motion() -> Any:
 
 
 @lru_cache(maxsize=1)
-def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
+def _document_model(kinds: tuple[type, ...]) -> type[BaseModel]:
     # Made anew where a class has come to be known: it takes a tenth of a second.
     clearance = model_of(Clearance, None, _clearance_fields())
     constraints = {**_kinds(Constraint), "Clearance": _clearance_model()}
@@ -213,20 +213,20 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
 
 
 def model_of(
-    cls: type, tag: tuple[str, str] | None = None, own: _Fields | None = None
+    cls: type, tag: tuple[str, str] | None = None, own_fields: _Fields | None = None
 ) -> type[BaseModel]:
     """Return the model of what a class is made from: its parameters, but for its context."""
     label = tag[1] if tag else cls.__name__
-    own = _OWN.get(label, {}) if own is None else own
+    own_fields = _OWN.get(label, {}) if own_fields is None else own_fields
     fields: _Fields = {} if tag is None else {tag[0]: (Literal[tag[1]], ...)}
     alone = label in _WHOLLY_OWN or issubclass(cls, Obstacle)
     parameters = {} if alone else _parameters(cls)
     for name, parameter in parameters.items():
-        if name not in getattr(cls, "context", ()) and name not in own:
+        if name not in getattr(cls, "context", ()) and name not in own_fields:
             default = ... if parameter.default is inspect.Parameter.empty else _default(parameter)
             fields[name] = (_type_of(parameter.annotation), default)
     about = (inspect.getdoc(cls) or "").partition("\n")[0]
-    return _model(label, {**fields, **own}, about)
+    return _model(label, {**fields, **own_fields}, about)
 
 
 def _parameters(cls: type) -> dict[str, inspect.Parameter]:
@@ -259,8 +259,8 @@ def _model(label: str, fields: _Fields, about: str = "") -> type[BaseModel]:
 
 
 def _kinds(family: type[Saved]) -> dict[str, type[BaseModel]]:
-    known = {kind: cls for kind, cls in family.kinds().items() if kind not in _NOT_IN_FILES}
-    return {kind: model_of(cls, ("kind", kind)) for kind, cls in known.items()}
+    kinds = {kind: cls for kind, cls in family.kinds().items() if kind not in _NOT_IN_FILES}
+    return {kind: model_of(cls, ("kind", kind)) for kind, cls in kinds.items()}
 
 
 def _shapes(*, rides: bool = False) -> Any:

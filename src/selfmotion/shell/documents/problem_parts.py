@@ -75,9 +75,11 @@ def name_kinds(
     """
     functions: dict[str, Callable[..., Any]] = {}
     for section, family in _FAMILIES.items():
-        found = table.get(section)
-        for k, item in enumerate(found if isinstance(found, list) else [found]):
-            where = f"{section}[{k}]" if isinstance(found, list) else section
+        section_table = table.get(section)
+        for k, item in enumerate(
+            section_table if isinstance(section_table, list) else [section_table]
+        ):
+            where = f"{section}[{k}]" if isinstance(section_table, list) else section
             if not isinstance(item, dict):
                 continue
             value = _code(item.get("kind"), f"{where}.kind", folder, allowed)
@@ -147,13 +149,13 @@ FEED_BOUNDS = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "w
 
 
 def path_of(
-    given: Mapping[str, Any],
+    table: Mapping[str, Any],
     robot: RobotModel,
     start: Array | None,
-    beside: Callable[[str], FilePath],
+    file_beside: Callable[[str], FilePath],
 ) -> Path:
-    """Return the tool motion of a problem file; files that it names are looked for `beside` it."""
-    values = dict(given)
+    """Return the tool motion of a problem file; its files are found by `file_beside`."""
+    values = dict(table)
     kind = values.get("kind")
     frame = None if kind == Placed.kind else values.pop("frame", None)
     weave, leads = values.pop("weave", None), values.pop("leads", None)
@@ -178,7 +180,7 @@ def path_of(
     match kind:
         case "file":
             del values["kind"]
-            path: Path = read_path(beside(values.pop("file")), **values)
+            path: Path = read_path(file_beside(values.pop("file")), **values)
             path = path if frame is not None else in_reference(path, robot)
         case "circle":
             path = _circle(values)
@@ -187,7 +189,7 @@ def path_of(
         case "spiral":
             path = Spiral(**{key: value for key, value in values.items() if key != "kind"})
         case _:
-            inner = partial(path_of, robot=robot, start=start, beside=beside)
+            inner = partial(path_of, robot=robot, start=start, file_beside=file_beside)
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
     path = path if weave is None else with_weave_table(path, weave)
@@ -251,46 +253,46 @@ def _with_inner(
     values: dict[str, Any], read: Callable[[Mapping[str, Any]], Path]
 ) -> dict[str, Any]:
     """Return the table of a path with the paths that it is made of in place of their tables."""
-    found = dict(values)
-    if "path" in found:
-        found["path"] = read(found["path"])
-    if "pieces" in found:
-        found["pieces"] = [read(item) for item in found["pieces"]]
-    return found
+    result = dict(values)
+    if "path" in result:
+        result["path"] = read(result["path"])
+    if "pieces" in result:
+        result["pieces"] = [read(item) for item in result["pieces"]]
+    return result
 
 
 def placed_if_mesh(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table of an obstacle; meshes are where their own coordinates say, by default."""
-    given = dict(values)
-    if given.get("shape") == Mesh.shape:
-        given.setdefault("position", [0.0, 0.0, 0.0])
-    return given
+    table = dict(values)
+    if table.get("shape") == Mesh.shape:
+        table.setdefault("position", [0.0, 0.0, 0.0])
+    return table
 
 
-def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
+def obstacle(values: Mapping[str, Any], file_beside: Callable[[str], FilePath]) -> Any:
     """Return an obstacle from a table with its pose in any of the ways of `pose_of`."""
     from selfmotion.model.path import pose_of
 
-    given = placed_if_mesh(values)
-    keys = [key for key in ("position", *ORIENTATIONS) if key in given]
+    table = placed_if_mesh(values)
+    keys = [key for key in ("position", *ORIENTATIONS) if key in table]
     try:
-        pose = pose_of({key: given.pop(key) for key in keys})
+        pose = pose_of({key: table.pop(key) for key in keys})
     except ValueError as error:
         raise FileFormatError(f"obstacle '{values.get('name')}': {error}") from error
-    if "file" in given:
+    if "file" in table:
         # A plan or a problem with this body may be kept in another folder than where it is made.
-        given["file"] = str(beside(given["file"]).resolve())
+        table["file"] = str(file_beside(table["file"]).resolve())
     position, rotation = pose.translation.tolist(), pose.rotation.tolist()
-    return obstacle_from_dict({**given, "position": position, "rotation": rotation})
+    return obstacle_from_dict({**table, "position": position, "rotation": rotation})
 
 
-def start_of(given: Any, robot: RobotModel, task: Task) -> Array | None:
+def start_of(setting: Any, robot: RobotModel, task: Task) -> Array | None:
     """Return the start configuration (n,) that a file asks for, None for a free one."""
-    if given == "free":
+    if setting == "free":
         return None
-    if given == "dexterous":
+    if setting == "dexterous":
         return robot.dexterous_configuration(task)
-    return robot.home if given == "home" else robot.configuration(given)
+    return robot.home if setting == "home" else robot.configuration(setting)
 
 
 def _restored(values: Mapping[str, Any]) -> Path:
@@ -308,8 +310,8 @@ def _restored(values: Mapping[str, Any]) -> Path:
 
 def _made(values: Mapping[str, Any]) -> Path:
     """Return a path that is made of others."""
-    given = {key: value for key, value in values.items() if key != "kind"}
-    path: Path = Path.kinds()[values["kind"]](**given)
+    options = {key: value for key, value in values.items() if key != "kind"}
+    path: Path = Path.kinds()[values["kind"]](**options)
     return path
 
 
@@ -337,10 +339,10 @@ def _line(values: dict[str, Any]) -> Path:
 
 
 def _require_one(values: Mapping[str, Any], *names: str) -> None:
-    given: Sequence[str] = [name for name in names if name in values]
-    if len(given) != 1:
-        found = " and ".join(given) or "neither"
-        raise ProblemError(f"has {found}, expected either {' or '.join(names)}")
+    present: Sequence[str] = [name for name in names if name in values]
+    if len(present) != 1:
+        listed = " and ".join(present) or "neither"
+        raise ProblemError(f"has {listed}, expected either {' or '.join(names)}")
 
 
 # A workpiece in a file: a frame, and the paths and bodies that are placed with it.
@@ -360,19 +362,19 @@ def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
     ProblemError
         A path has no place in it, or its bodies are looked at by nothing.
     """
-    found = dict(table)
-    if NAME not in found:
-        return found
-    piece = found.pop(NAME)
+    placed = dict(table)
+    if NAME not in placed:
+        return placed
+    piece = placed.pop(NAME)
     frame, carrier = piece.get("frame", SE3.Identity()), piece.get("on")
-    if carrier is not None and found["robot"].get("reference") != carrier:
+    if carrier is not None and placed["robot"].get("reference") != carrier:
         raise ProblemError(
             f"workpiece: is on '{carrier}', so that paths are in its frame: expected "
             f"robot.reference = '{carrier}'"
         )
-    found["path"] = placed_path(found["path"], frame)
-    if "also" in found:
-        found["also"] = [_placed_follow(item, frame, carrier) for item in found["also"]]
+    placed["path"] = placed_path(placed["path"], frame)
+    if "also" in placed:
+        placed["also"] = [_placed_follow(item, frame, carrier) for item in placed["also"]]
     bodies = [placed_body(item, frame, carrier) for item in piece.get("obstacles", [])]
     if "mesh" in piece:
         scale = {"scale": piece["scale"]} if "scale" in piece else {}
@@ -380,7 +382,7 @@ def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
         bodies.append(placed_body({**mesh, **scale}, frame, carrier))
     elif "scale" in piece:
         raise ProblemError("workpiece: scale has no effect without a mesh")
-    return _with_bodies(found, bodies) if bodies else found
+    return _with_bodies(placed, bodies) if bodies else placed
 
 
 def placed_path(values: Mapping[str, Any], frame: SE3) -> dict[str, Any]:
@@ -392,21 +394,21 @@ def placed_path(values: Mapping[str, Any], frame: SE3) -> dict[str, Any]:
 
 def placed_body(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
     """Return the table of an obstacle that is in a frame, as one in the world or on a link."""
-    found = placed_if_mesh(values)
-    keys = [key for key in ("position", *ORIENTATIONS) if key in found]
+    placed = placed_if_mesh(values)
+    keys = [key for key in ("position", *ORIENTATIONS) if key in placed]
     try:
-        pose = frame * pose_of({key: found.pop(key) for key in keys})
+        pose = frame * pose_of({key: placed.pop(key) for key in keys})
     except ValueError as error:
         raise FileFormatError(f"workpiece: obstacle '{values.get('name')}': {error}") from error
-    if "frame" in found:
+    if "frame" in placed:
         raise ProblemError(
-            f"workpiece: obstacle '{values.get('name')}' rides on '{found['frame']}'; what belongs "
-            f"to the workpiece moves with it"
+            f"workpiece: obstacle '{values.get('name')}' rides on '{placed['frame']}'; what "
+            f"belongs to the workpiece moves with it"
         )
     if carrier is not None:
-        found["frame"] = carrier
+        placed["frame"] = carrier
     rotation = pose.rotation.tolist()
-    return {**found, "position": pose.translation.tolist(), "rotation": rotation}
+    return {**placed, "position": pose.translation.tolist(), "rotation": rotation}
 
 
 def _placed_follow(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
@@ -432,8 +434,8 @@ def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[st
         raise ProblemError("workpiece: has bodies, but clearance is false; give its distance")
     first, *rest = clearance if isinstance(clearance, list) else [clearance]
     several = [*first.get("obstacles", []), *bodies]
-    found = {"distance": 0.0, **first, "obstacles": several}
-    return {**table, "clearance": [found, *rest] if rest else found}
+    extended = {"distance": 0.0, **first, "obstacles": several}
+    return {**table, "clearance": [extended, *rest] if rest else extended}
 
 
 def belonging(document: Mapping[str, Any]) -> tuple[str, ...] | None:

@@ -67,8 +67,8 @@ def problem_document(problem: Problem, file: FilePath) -> dict[str, Any]:
 
 def _named_beside(table: dict[str, Any], file: FilePath) -> dict[str, Any]:
     """Return a table whose files are named from where its own file is."""
-    found: dict[str, Any] = named_from(table, FilePath.cwd(), file.parent.resolve())
-    return found
+    named: dict[str, Any] = named_from(table, FilePath.cwd(), file.parent.resolve())
+    return named
 
 
 def _settings(job: PlanRequest) -> dict[str, Any]:
@@ -162,22 +162,22 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     return table
 
 
-def _check_limits(robot: RobotModel, known: RobotModel) -> None:
+def _check_limits(robot: RobotModel, reloaded: RobotModel) -> None:
     """Refuse an arm that was given other limits than it is loaded with."""
     for name in (*LIMITS, "acceleration_limit", "jerk_limit"):
-        if not np.array_equal(getattr(robot, name), getattr(known, name)):
+        if not np.array_equal(getattr(robot, name), getattr(reloaded, name)):
             raise ProblemError(
                 f"{robot.name}: its {name} is another than it is loaded with, which a problem file "
                 f"cannot carry; ask for limits by constraints (JointVelocityLimits, …)"
             )
 
 
-def _check_calibration(robot: RobotModel, known: RobotModel) -> None:
+def _check_calibration(robot: RobotModel, reloaded: RobotModel) -> None:
     """Refuse an arm whose joints are elsewhere than its calibration file says now."""
     if not robot.urdf.is_calibrated:
         return
     placements = _placements(robot)
-    if any(placements[name] != place for name, place in _placements(known).items()):
+    if any(placements[name] != place for name, place in _placements(reloaded).items()):
         raise ProblemError(
             f"{robot.name}: its joints are elsewhere than its calibration file says now, so that "
             f"a problem file would name another arm; load it again"
@@ -193,23 +193,23 @@ def _placements(robot: RobotModel) -> dict[str, dict[str, str]]:
 
 def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     """Refuse a cell whose parts' files are no longer those that it was made of."""
-    given = robot.urdf.parts
-    for part in given:
+    parts = robot.urdf.parts
+    for part in parts:
         if part.source not in {**NAMED_ARMS, **NAMED_PARTS} and not is_file(FilePath(part.source)):
             raise ProblemError(
                 f"{robot.name}: part '{part.name}' is of {part.source}, and in no file that a "
                 f"problem file could name; write its URDF to one and load it from there"
             )
     now = load_robot(
-        {part.name: part.source for part in given},
+        {part.name: part.source for part in parts},
         tools,
         robot.locked,
         reference=robot.reference,
-        base={part.name: part.base for part in given if part.base is not None},
-        on={part.name: part.on for part in given if part.on is not None},
-        arguments={part.name: part.arguments for part in given},
+        base={part.name: part.base for part in parts if part.base is not None},
+        on={part.name: part.on for part in parts if part.on is not None},
+        arguments={part.name: part.arguments for part in parts},
         packages=robot.urdf.packages,
-        calibration={part.name: part.calibration for part in given if part.calibration} or None,
+        calibration={part.name: part.calibration for part in parts if part.calibration} or None,
     )
     _check_calibration(robot, now)
     if now.urdf.bare_text() != robot.urdf.bare_text():
@@ -234,9 +234,9 @@ def _check_frames(robot: RobotModel) -> None:
 
 
 def _part(part: UrdfPart) -> dict[str, Any]:
-    known = part.source in {**NAMED_ARMS, **NAMED_PARTS}
-    source = part.source if known else str(FilePath(part.source).resolve())
-    table: dict[str, Any] = {"name" if known else "file": source}
+    is_known_by_name = part.source in {**NAMED_ARMS, **NAMED_PARTS}
+    source = part.source if is_known_by_name else str(FilePath(part.source).resolve())
+    table: dict[str, Any] = {"name" if is_known_by_name else "file": source}
     if part.base is not None:
         table["base"] = {
             "position": part.base.translation.tolist(),
@@ -252,8 +252,8 @@ def _part(part: UrdfPart) -> dict[str, Any]:
 
 
 def _is_named(robot: RobotModel, name: str) -> bool:
-    known = load_robot(name)
-    return known.urdf.text == robot.urdf.bare_text() and known.touching == robot.touching
+    reloaded = load_robot(name)
+    return reloaded.urdf.text == robot.urdf.bare_text() and reloaded.touching == robot.touching
 
 
 def _described(value: Saved) -> dict[str, Any]:

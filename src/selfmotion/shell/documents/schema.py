@@ -135,18 +135,18 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
 def _classes() -> dict[str, type]:
     # Classes of the user's own may come to be known later.
     families: tuple[type[Saved], ...] = (Path, NullMotion, Cost, Constraint)
-    known = {kind: cls for family in families for kind, cls in family.kinds().items()}
-    return {**known, **dict(obstacle_shapes())}
+    classes = {kind: cls for family in families for kind, cls in family.kinds().items()}
+    return {**classes, **dict(obstacle_shapes())}
 
 
 def notes_of(table: str) -> dict[str, str]:
     """Return what the keys of a table mean, in Markdown, by key: of a class or of one of ours."""
     own = _classes().get(table)
     sources = (*((own,) if own else ()), *_GIVEN_TO.get(table, ()))
-    found: dict[str, str] = {}
+    notes: dict[str, str] = {}
     for source in sources:
-        found |= _parameters(source)
-    return {**_IN_FILES[""], **found, **_IN_FILES.get(table, {})}
+        notes |= _parameters(source)
+    return {**_IN_FILES[""], **notes, **_IN_FILES.get(table, {})}
 
 
 @cache
@@ -155,13 +155,13 @@ def _parameters(source: Callable[..., Any]) -> dict[str, str]:
     from docstring_parser import DocstringStyle, parse
 
     documented = source.__mro__[::-1] if isinstance(source, type) else (source,)
-    found: dict[str, str] = {}
+    parameters: dict[str, str] = {}
     for each in documented:
         for item in parse(inspect.getdoc(each) or "", style=DocstringStyle.NUMPYDOC).params:
             for name in item.arg_name.split(","):
                 if item.description:
-                    found[name.strip()] = " ".join(item.description.split())
-    return found
+                    parameters[name.strip()] = " ".join(item.description.split())
+    return parameters
 
 
 # The JSON Schema of problem and job files, for editors.
@@ -199,9 +199,9 @@ def json_schema() -> dict[str, Any]:
     seams.
     """
     schema = document_model().model_json_schema()
-    known, keys = schema["$defs"], schema["properties"]
-    known[_MOTION] = keys["path"]
-    _made_of_others(known)
+    definitions, keys = schema["$defs"], schema["properties"]
+    definitions[_MOTION] = keys["path"]
+    _made_of_others(definitions)
     keys |= {"path": _of(_MOTION), "seams": _seams(schema), "job": _job(schema)}
     one = keys["clearance"]
     keys["clearance"] = {"anyOf": [_FLAG, one, {"type": "array", "items": one}]}
@@ -212,19 +212,19 @@ def json_schema() -> dict[str, Any]:
         "oneOf": [{"required": ["path"]}, {"required": ["seams"]}],
         "dependentRequired": {"job": ["seams"]},
     }
-    found: dict[str, Any] = _with_units(schema)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+    scaled: dict[str, Any] = _with_units(schema)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **scaled}
 
 
 def _of(definition: str) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{definition}"}
 
 
-def _made_of_others(known: Mapping[str, Any]) -> None:
+def _made_of_others(definitions: Mapping[str, Any]) -> None:
     """Say of paths that are made of others that these are paths."""
-    motion = known[_MOTION]
+    motion = definitions[_MOTION]
     for reference in motion["discriminator"]["mapping"].values():
-        keys = known[reference.rpartition("/")[2]]["properties"]
+        keys = definitions[reference.rpartition("/")[2]]["properties"]
         for name in _INNER:
             if name in keys:
                 several = name == "pieces"
@@ -233,14 +233,17 @@ def _made_of_others(known: Mapping[str, Any]) -> None:
 
 def _seams(schema: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a list of seams, or one table of all of them, may say."""
-    known, keys = schema["$defs"], schema["properties"]
-    leaves = {"type": "array", "items": known["Workpiece"]["properties"]["obstacles"]["items"]}
+    definitions, keys = schema["$defs"], schema["properties"]
+    leaves = {
+        "type": "array",
+        "items": definitions["Workpiece"]["properties"]["obstacles"]["items"],
+    }
     of_all = {
         **{name: value for name, value in _OF_SEAM.items() if name in SEAM},
         **{name: keys[name] for name in OF_PROBLEM},
         "leaves": leaves,
     }
-    file = known["file"]["properties"]
+    file = definitions["file"]["properties"]
     table = {
         **{name: value for name, value in of_all.items() if name not in ("name", "path")},
         **{name: file[name] for name in OF_TABLE if name in file},
@@ -292,16 +295,16 @@ def _with_units(node: Any) -> Any:
         return [_with_units(item) for item in node]
     if not isinstance(node, dict):
         return node
-    found = {name: _with_units(value) for name, value in node.items()}
+    with_units = {name: _with_units(value) for name, value in node.items()}
     # JSON has no infinity.
-    if isinstance(found.get("default"), float) and math.isinf(found["default"]):
-        del found["default"]
-    keys = found.get("properties")
+    if isinstance(with_units.get("default"), float) and math.isinf(with_units["default"]):
+        del with_units["default"]
+    keys = with_units.get("properties")
     # A schema's own word, unless it is a key that is called so.
-    if not isinstance(keys, dict) or "type" not in found:
-        return found
-    if found.get("title") == QuasiNewton.__name__:
-        return found
+    if not isinstance(keys, dict) or "type" not in with_units:
+        return with_units
+    if with_units.get("title") == QuasiNewton.__name__:
+        return with_units
     for suffix, names, scale, units in (
         ("_deg", ANGLES, 180.0 / math.pi, ("rad", "°")),
         ("_mm", LENGTHS, 1e3, ("m", "mm")),
@@ -311,9 +314,9 @@ def _with_units(node: Any) -> Any:
             if _is_table(keys[name]) or is_share(name, keys.get("kind", {}).get("const")):
                 continue
             keys[name + suffix] = _scaled(keys[name], scale, units)
-            if name in found.get("required", []):
-                found["required"].remove(name)
-    return found
+            if name in with_units.get("required", []):
+                with_units["required"].remove(name)
+    return with_units
 
 
 def _is_table(node: Mapping[str, Any]) -> bool:
@@ -322,17 +325,17 @@ def _is_table(node: Mapping[str, Any]) -> bool:
 
 def _scaled(node: Mapping[str, Any], scale: float, units: tuple[str, str]) -> dict[str, Any]:
     """Return the schema of a value in another unit, with its default and description in that."""
-    found = dict(node)
-    if "description" in found:
+    scaled = dict(node)
+    if "description" in scaled:
         old, new = units
-        found["description"] = re.sub(
+        scaled["description"] = re.sub(
             r"\[[^\[\]]*\]",
             lambda unit: re.sub(rf"(?<!\w){old}(?!\w)", new, unit[0]),
-            found["description"],
+            scaled["description"],
         )
-    default = found.get("default")
+    default = scaled.get("default")
     if isinstance(default, int | float) and not isinstance(default, bool):
-        found["default"] = float(f"{default * scale:.12g}")
+        scaled["default"] = float(f"{default * scale:.12g}")
     elif default is not None:
-        del found["default"]
-    return found
+        del scaled["default"]
+    return scaled

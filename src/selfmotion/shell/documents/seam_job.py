@@ -103,7 +103,7 @@ class SeamJob:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes before planning, see `Problem.remarks`; of alike ones that of the first seam."""
-        found: dict[str, str] = {}
+        remarks: dict[str, str] = {}
         for seam in self.seams:
             try:
                 problem = self._problem(seam)
@@ -111,8 +111,8 @@ class SeamJob:
                 # It is told why when the seam is planned.
                 continue
             for remark in problem.remarks:
-                found.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
-        return (*self.notes, *found.values())
+                remarks.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
+        return (*self.notes, *remarks.values())
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -124,7 +124,7 @@ class SeamJob:
         constraints, clearances = separate_clearances(
             every, self.settings.get("clearance", NO_OVERLAP)
         )
-        found = Problem(
+        problem = Problem(
             self.robot,
             seam.path,
             seam.task,
@@ -132,7 +132,7 @@ class SeamJob:
             relaxations=tuple(seam.relaxations),
             clearance=clearances,
         )
-        return found if seam.costs is None else replace(found, costs=tuple(seam.costs))
+        return problem if seam.costs is None else replace(problem, costs=tuple(seam.costs))
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.
@@ -192,16 +192,16 @@ def seam_job_of(
 
     Where many documents are read, those with the same arm share it by `cache`.
     """
-    given, settings = document.get("seams"), document.get("job", {})
-    if isinstance(given, dict) and given.get("feed") == HIGHEST:
-        return _at_highest(document, given, file, allow_code=allow_code)
-    if isinstance(given, dict) and "most_feed" in given:
+    seams_setting, settings = document.get("seams"), document.get("job", {})
+    if isinstance(seams_setting, dict) and seams_setting.get("feed") == HIGHEST:
+        return _at_highest(document, seams_setting, file, allow_code=allow_code)
+    if isinstance(seams_setting, dict) and "most_feed" in seams_setting:
         raise FileFormatError(
             f"{file}: seams: most_feed: has no effect where feed is a number; give feed = "
             f"'{HIGHEST}', or leave it out"
         )
     shared = {key: value for key, value in document.items() if key not in ("seams", "job")}
-    if "path" in shared or not isinstance(given, dict | list) or not given:
+    if "path" in shared or not isinstance(seams_setting, dict | list) or not seams_setting:
         raise FileFormatError(
             f"{file}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
             f"beside them"
@@ -215,36 +215,40 @@ def seam_job_of(
     if not isinstance(shared.get(NAME, {}), Mapping):
         raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
     reader = _Reader(file, shared, allow_code, {} if cache is None else cache)
-    entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
+    entries = (
+        [reader.of_table(seams_setting)]
+        if isinstance(seams_setting, dict)
+        else map(reader.of_list, seams_setting)
+    )
     seams = [seam for several in entries for seam in several]
-    whole = reader.first
+    first = reader.first
     options = reader.settings(settings)
-    if whole.problem.clearance is not NO_OVERLAP:
-        options["clearance"] = whole.problem.clearance
+    if first.problem.clearance is not NO_OVERLAP:
+        options["clearance"] = first.problem.clearance
     is_cut = any(UNJUDGED in seam.path.notes for seam in seams)
     return SeamJob(
-        whole.problem.robot,
+        first.problem.robot,
         tuple(seams),
-        {**options, "constraints": list(whole.problem.constraints)},
+        {**options, "constraints": list(first.problem.constraints)},
         unjudged=(UNJUDGED,) if is_cut else (),
-        notes=(*whole.notes, *([_RENAMED] if FORMER_SECONDS in settings else [])),
+        notes=(*first.notes, *([_RENAMED] if FORMER_SECONDS in settings else [])),
     )
 
 
 def _at_highest(
-    document: Mapping[str, Any], given: Mapping[str, Any], file: FilePath, *, allow_code: bool
+    document: Mapping[str, Any], section: Mapping[str, Any], file: FilePath, *, allow_code: bool
 ) -> SeamJob:
     """Return the job of a document that asks for the highest feed."""
-    most = given.get("most_feed", FASTEST_FEED)
+    most = section.get("most_feed", FASTEST_FEED)
     if not (isinstance(most, int | float) and 0.0 < most <= FASTEST_FEED):
         raise FileFormatError(
             f"{file}: seams: most_feed is {shown(most)}, expected a feed up to {FASTEST_FEED:g} m/s"
         )
-    rest = {key: value for key, value in given.items() if key != "most_feed"}
+    rest = {key: value for key, value in section.items() if key != "most_feed"}
 
     def at_feed(feed: float) -> SeamJob:
-        asked = {**document, "seams": {**rest, "feed": feed}}
-        return seam_job_of(asked, file, allow_code=allow_code)
+        with_feed = {**document, "seams": {**rest, "feed": feed}}
+        return seam_job_of(with_feed, file, allow_code=allow_code)
 
     slow = at_feed(_SLOW * most)
     return replace(slow, at_feed=at_feed, most_feed=float(most))
@@ -265,22 +269,22 @@ class _Reader:
         self.first = self._read({"path": _ANY}, "seams")
         self._standing = standing(shared)
 
-    def of_list(self, given: Any) -> list[Seam]:
+    def of_list(self, entry: Any) -> list[Seam]:
         """Return the seam of an entry of [[seams]]."""
-        if not isinstance(given, Mapping):
+        if not isinstance(entry, Mapping):
             raise FileFormatError(f"{self._file}: seams: an entry is no table, expected [[seams]]")
-        name = given.get("name")
+        name = entry.get("name")
         where = f"seams, '{name}'"
-        self._check(given, (*SEAM, *OF_PROBLEM), where)
-        if "path" not in given:
+        self._check(entry, (*SEAM, *OF_PROBLEM), where)
+        if "path" not in entry:
             raise FileFormatError(f"{self._file}: {where}: path is missing")
-        path, own = given["path"], dict(given)
-        if isinstance(path, Mapping) and "events" not in given:
+        path, values = entry["path"], dict(entry)
+        if isinstance(path, Mapping) and "events" not in entry:
             events, one_way = self._events_of(in_si(path), where)
-            own |= {"events": events} if events else {}
+            values |= {"events": events} if events else {}
             if events or one_way:
-                own.setdefault("either_way", False)
-        return [self._seam(own, None, where)]
+                values.setdefault("either_way", False)
+        return [self._seam(values, None, where)]
 
     def _events_of(
         self, path: Mapping[str, Any], where: str
@@ -290,15 +294,19 @@ class _Reader:
         if kind == "file":
             return self._events_of_file(path, where)
         inner = [path.get("path"), *(pieces if isinstance(pieces, list) else [])]
-        found = [self._events_of(in_si(one), where) for one in inner if isinstance(one, Mapping)]
-        events = [event for several, _ in found for event in several]
+        found_events = [
+            self._events_of(in_si(one), where) for one in inner if isinstance(one, Mapping)
+        ]
+        events = [event for several, _ in found_events for event in several]
         if events and kind not in _IN_STEP:
             raise FileFormatError(
                 f"{self._file}: {where}: path: a path of kind {shown(kind)} has other times than "
                 f"the file in it, whose event '{events[0][0]}' would be lost; say when in events, "
                 f"or put the file into the path itself"
             )
-        return _after_lead(events, path.get("leads"), None), any(one_way for _, one_way in found)
+        return _after_lead(events, path.get("leads"), None), any(
+            one_way for _, one_way in found_events
+        )
 
     def _events_of_file(
         self, path: Mapping[str, Any], where: str
@@ -317,10 +325,10 @@ class _Reader:
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
 
-    def of_table(self, given: Mapping[str, Any]) -> list[Seam]:
+    def of_table(self, section: Mapping[str, Any]) -> list[Seam]:
         """Return the seams of a file with a column ``seam``."""
-        self._check(given, (*SEAM[1:], *OF_PROBLEM[1:], *OF_TABLE), "seams")
-        values = in_si(given)
+        self._check(section, (*SEAM[1:], *OF_PROBLEM[1:], *OF_TABLE), "seams")
+        values = in_si(section)
         if "file" not in values:
             raise FileFormatError(f"{self._file}: seams: file is missing, or a list [[seams]]")
         try:
@@ -329,12 +337,12 @@ class _Reader:
             raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
         table = self._file.parent / values["file"]
         options = {key: values[key] for key in _PACED if key in values}
-        rest = {key: value for key, value in given.items() if key not in OF_TABLE}
-        found, seams = list[Seam](), self._seams_of(table, options)
+        rest = {key: value for key, value in section.items() if key not in OF_TABLE}
+        seams, paths = list[Seam](), self._seams_of(table, options)
         # What a machine switches stays switched in the cuts that follow: they keep their order.
-        switched = any(rows.one_way and rows.events for _, rows in seams.values())
-        for name, (path, rows) in seams.items():
-            own = {**rest, "name": name}
+        switched = any(rows.one_way and rows.events for _, rows in paths.values())
+        for name, (path, rows) in paths.items():
+            entry = {**rest, "name": name}
             events = times_of_events(path, rows)
             if "weave" in values:
                 path = with_weave_table(path, values["weave"])
@@ -344,19 +352,19 @@ class _Reader:
                 events = _after_lead(events, values["leads"], path)
                 path = with_lead_table(path, values["leads"])
             if events:
-                own["events"] = [*events, *rest.get("events", [])]
+                entry["events"] = [*events, *rest.get("events", [])]
             if events or rows.one_way:
                 # What happens where, and how a machine cuts, is meant one way.
-                own.setdefault("either_way", False)
-            if switched and found:
-                own.setdefault("after", [found[-1].name])
+                entry.setdefault("either_way", False)
+            if switched and seams:
+                entry.setdefault("after", [seams[-1].name])
             place = self._standing[0] if frame is None else self._standing[0] * frame
             if frame is not None or NAME in self._shared:
                 path = Placed(path, place)
             else:
                 path = in_reference(path, self.first.problem.robot)
-            found.append(self._seam(own, path, f"seams, '{name}'"))
-        return found
+            seams.append(self._seam(entry, path, f"seams, '{name}'"))
+        return seams
 
     def _seams_of(self, table: FilePath, options: Mapping[str, Any]) -> Any:
         """Return the seams of a file; the same file is read once for many documents."""
@@ -366,11 +374,11 @@ class _Reader:
             self._cache[key] = read_seams(table, options)
         return self._cache[key]
 
-    def settings(self, given: Any) -> dict[str, Any]:
+    def settings(self, section: Any) -> dict[str, Any]:
         """Return the settings of [job]."""
-        if not isinstance(given, Mapping):
+        if not isinstance(section, Mapping):
             raise FileFormatError(f"{self._file}: job: expected a table [job]")
-        values = in_si(given)
+        values = in_si(section)
         if FORMER_SECONDS in values and MOVE_SECONDS not in values:
             values[MOVE_SECONDS] = values.pop(FORMER_SECONDS)
         self._check(values, JOB, "job")
@@ -383,16 +391,16 @@ class _Reader:
             raise FileFormatError(f"{self._file}: job: {name}: {error}") from error
         return values
 
-    def _seam(self, given: Mapping[str, Any], path: Path | None, where: str) -> Seam:
-        own = {key: value for key, value in given.items() if key in OF_PROBLEM}
-        constraints = own.pop("constraints", [])
+    def _seam(self, entry: Mapping[str, Any], path: Path | None, where: str) -> Seam:
+        of_problem = {key: value for key, value in entry.items() if key in OF_PROBLEM}
+        constraints = of_problem.pop("constraints", [])
         whole = self._shared.get("constraints", [])
-        document = {"path": _ANY, **own}
+        document = {"path": _ANY, **of_problem}
         if constraints:
             document["constraints"] = [*whole, *constraints]
         problem = self._read(document, where).problem
         besides = _besides(problem, whole, constraints)
-        values = {key: value for key, value in in_si(given).items() if key in SEAM}
+        values = {key: value for key, value in in_si(entry).items() if key in SEAM}
         try:
             leaves = [self._left(in_si(item)) for item in values.pop("leaves", [])]
             return Seam(
@@ -413,28 +421,28 @@ class _Reader:
             values = placed_body(values, *self._standing)
         return obstacle(values, lambda name: self._file.parent / name)
 
-    def _read(self, own: Mapping[str, Any], where: str) -> PlanRequest:
-        document = {**self._shared, **own}
+    def _read(self, values: Mapping[str, Any], where: str) -> PlanRequest:
+        document = {**self._shared, **values}
         try:
             return plan_request_of(document, self._file, allow_code=self._code, cache=self._cache)
         except SelfmotionError as error:
             text = str(error).removeprefix(f"{self._file}: ")
             raise FileFormatError(f"{self._file}: {where}: {text}") from error
 
-    def _check(self, given: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-        for key in given:
+    def _check(self, table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
+        for key in table:
             plain = key.removesuffix("_deg").removesuffix("_mm")
-            if plain not in known:
+            if plain not in keys:
                 raise FileFormatError(
-                    f"{self._file}: {where}: unknown key '{key}'{nearest(key, known)}; expected "
-                    f"{', '.join(known)}"
+                    f"{self._file}: {where}: unknown key '{key}'{nearest(key, keys)}; expected "
+                    f"{', '.join(keys)}"
                 )
             kind, what = _KINDS.get(plain, (object, ""))
-            if not isinstance(given[key], kind):
+            if not isinstance(table[key], kind):
                 raise FileFormatError(
-                    f"{self._file}: {where}: {key} is {shown(given[key])}, expected {what}"
+                    f"{self._file}: {where}: {key} is {shown(table[key])}, expected {what}"
                 )
-        if not all(isinstance(item, Mapping) for item in given.get("leaves", ())):
+        if not all(isinstance(item, Mapping) for item in table.get("leaves", ())):
             raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
 
 

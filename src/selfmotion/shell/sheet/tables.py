@@ -39,20 +39,20 @@ class Section:
 
 def plan_sections(plan: Plan, margins: Margins | None) -> tuple[Section, ...]:
     """Return the tables of a plan, with margins where they are known."""
-    found = [_what(plan)]
+    sections = [_what(plan)]
     if margins is not None:
-        found.append(_margins(margins))
-    found += [_path(plan), _kept(plan), _active(plan), _used(plan), _reversals(plan)]
-    found += [_approaches(plan), _feeds(plan), _assumed(_assumptions(plan))]
-    return tuple(section for section in found if section.rows)
+        sections.append(_margins(margins))
+    sections += [_path(plan), _kept(plan), _active(plan), _used(plan), _reversals(plan)]
+    sections += [_approaches(plan), _feeds(plan), _assumed(_assumptions(plan))]
+    return tuple(section for section in sections if section.rows)
 
 
 def program_sections(program: Program, margins: Mapping[str, Margins]) -> tuple[Section, ...]:
     """Return the tables of a program, with the margins of seams (by name) that are known."""
-    found = [_what_program(program), _seams(program), _events(program)]
-    found += [_margins(each, f"Seam '{name}': ") for name, each in margins.items()]
-    found += [_kept_by_seams(program), _moves(program), _assumed(_assumptions_of(program))]
-    return tuple(section for section in found if section.rows)
+    sections = [_what_program(program), _seams(program), _events(program)]
+    sections += [_margins(each, f"Seam '{name}': ") for name, each in margins.items()]
+    sections += [_kept_by_seams(program), _moves(program), _assumed(_assumptions_of(program))]
+    return tuple(section for section in sections if section.rows)
 
 
 def _what(plan: Plan) -> Section:

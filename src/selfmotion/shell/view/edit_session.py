@@ -12,10 +12,10 @@ from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.view.document import Edited, EditedPlan
-from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.handles import Handle, dragged, handles_of
 from selfmotion.shell.view.page_session import PageSession
 from selfmotion.shell.view.planning import Planning
+from selfmotion.shell.view.requests import Outcome, Request
 from selfmotion.shell.view.sliders import Slider, sliders_of
 
 # Largest deviation of a matrix that the page sends from a pose.
@@ -54,10 +54,10 @@ class EditSession(PageSession):
         self._last_plan: Plan | None = None
         self._handles: dict[str, Handle] = {}
         self._sliders: dict[str, Slider] = {}
-        given = None
+        initial = None
         if isinstance(self.edited, EditedPlan):
-            given = self.edited.document, self.edited.plan
-        self._planning = Planning(file, allow_code, self._on_result, given)
+            initial = self.edited.document, self.edited.plan
+        self._planning = Planning(file, allow_code, self._on_result, initial)
         # Planned before there is a page, so that an invalid file fails at once.
         first = self._planning.answer(Request(0, self.edited.document))
         self.open(first)
@@ -149,10 +149,10 @@ class EditSession(PageSession):
 
     def _save(self) -> None:
         if isinstance(self.edited, EditedPlan):
-            found = self.current("saved")
-            if found.plan is None or found.kind == "none":
-                raise PlanError(f"{found.words}; there is no plan to be saved")
-            self.edited.plan = found.plan
+            outcome = self.current("saved")
+            if outcome.plan is None or outcome.kind == "none":
+                raise PlanError(f"{outcome.words}; there is no plan to be saved")
+            self.edited.plan = outcome.plan
         self.edited.save()
 
     # The planner.
@@ -171,22 +171,22 @@ class EditSession(PageSession):
             "undo": edited.can_undo,
         }
 
-    def _on_result(self, found: Found) -> None:
+    def _on_result(self, outcome: Outcome) -> None:
         with self._lock:
-            self._found = found
-            if found.plan is not None:
-                self._last_plan = found.plan
-                self._handles = handles_of(found.request.document, found.plan.problem)
+            self._found = outcome
+            if outcome.plan is not None:
+                self._last_plan = outcome.plan
+                self._handles = handles_of(outcome.request.document, outcome.plan.problem)
         self.tell()
 
     @override
-    def _is_current(self, found: Found) -> bool:
-        return super()._is_current(found) and found.request.number == self._revision
+    def _is_current(self, outcome: Outcome) -> bool:
+        return super()._is_current(outcome) and outcome.request.number == self._revision
 
     @override
-    def _answered(self, found: Found) -> int:
+    def _answered(self, outcome: Outcome) -> int:
         # Only the plan of the latest document answers the latest request.
-        return self._request_id if found.request.number == self._revision else _NO_REQUEST
+        return self._request_id if outcome.request.number == self._revision else _NO_REQUEST
 
 
 def _pose(matrix: Any) -> SE3:

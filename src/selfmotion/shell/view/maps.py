@@ -9,7 +9,7 @@ from selfmotion.basics import Progress
 from selfmotion.planning.redundancy import PIXELS
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.redundancy import MOST_SEAMS, SLICES, SeamMaps, slices
-from selfmotion.shell.view.found import Found
+from selfmotion.shell.view.requests import Outcome
 
 # All maps of a page are made in about this time [s]; on machines that are busy it is more.
 _SECONDS = 1.0
@@ -19,12 +19,12 @@ _TRIED, _FEWEST = (5, 15), 15
 _LEAST = 1e-6
 
 
-def maps_soon(found: Found, progress: Progress) -> Iterator[SeamMaps]:
+def maps_soon(outcome: Outcome, progress: Progress) -> Iterator[SeamMaps]:
     """Yield the maps of a plan or of the seams of a job; `progress` may leave them.
 
     Bodies that have to be far apart make each pixel take long: then there are fewer.
     """
-    plans = [] if found.replayed is None else list(found.replayed.plans)
+    plans = [] if outcome.replayed is None else list(outcome.replayed.plans)
     if len(plans) > MOST_SEAMS:
         return
     for begin, name, plan in plans:

@@ -10,9 +10,9 @@ from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.replay.sequence import SequenceReplay
 from selfmotion.shell.view.document import EditedPlan
 from selfmotion.shell.view.edit_session import EditSession
-from selfmotion.shell.view.found import Found, Request
 from selfmotion.shell.view.motions import shown_as_written, shown_program
 from selfmotion.shell.view.page_session import PageSession
+from selfmotion.shell.view.requests import Outcome, Request
 from selfmotion.shop import controllers
 from selfmotion.work.job import Program, load_program
 
@@ -68,7 +68,7 @@ def _of_plan(file: Path, allow_code: bool) -> PageSession:
         text = str(error).removeprefix(f"{file}: ")
         session = PageSession(file, f"the plan is shown as it is, its problem is no file's: {text}")
         verdict = plan.certificate.verdict
-        session.open(Found(_NOTHING, "whole", verdict, PlanReplay(plan), is_brief=False))
+        session.open(Outcome(_NOTHING, "whole", verdict, PlanReplay(plan), is_brief=False))
         return session
     return EditSession(file, edited, allow_code=allow_code)
 
@@ -85,7 +85,7 @@ def _of_written(file: Path, program: Program) -> PageSession:
     seams = program.plans
     unmade = tuple(seams[step.name].path for step in wrong if step.name in seams)
     session = PageSession(file, f"{file.name} is shown as it is, and judged by its job")
-    session.open(Found(_NOTHING, "whole", words, replayed, unmade=unmade, is_brief=False))
+    session.open(Outcome(_NOTHING, "whole", words, replayed, unmade=unmade, is_brief=False))
     return session
 
 
@@ -94,5 +94,5 @@ def _of_made(file: Path, made: Program | Parts) -> PageSession:
     source = "its job file" if isinstance(made, Program) else "its problem file"
     session = PageSession(file, f"{what} is shown as it is; `selfmotion view` changes {source}")
     replayed = shown_program(made) if isinstance(made, Program) else SequenceReplay.of(made)
-    session.open(Found(_NOTHING, "whole", made.verdict, replayed, made, is_brief=False))
+    session.open(Outcome(_NOTHING, "whole", made.verdict, replayed, made, is_brief=False))
     return session

@@ -11,7 +11,7 @@ from selfmotion.planning.result import Parts, Plan, load_plan
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.page import live_html
 from selfmotion.shell.replay.replayed import PlanReplay
-from selfmotion.shell.view.found import Found
+from selfmotion.shell.view.requests import Outcome
 from selfmotion.shell.view.shown import Shown
 from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion
 
@@ -46,13 +46,13 @@ class PageSession:
         self.file, self._why = file, why
         # How programs of controllers are written; None for what these settings are by default.
         self.settings: ProgramSettings | None = None
-        self._found: Found | None = None
+        self._found: Outcome | None = None
         self._beside: tuple[str, Plan] | None = None
         self._html, self._shown = "", Shown()
         self._send: Callable[[bytes], None] | None = None
         self._lock, self._telling = threading.RLock(), threading.Lock()
 
-    def open(self, found: Found) -> None:
+    def open(self, outcome: Outcome) -> None:
         """Make the page, with what there is to show first.
 
         Raises
@@ -60,15 +60,15 @@ class PageSession:
         ProblemError
             That is nothing.
         """
-        if found.replayed is None:
-            raise ProblemError(f"{self.file}: {found.words}")
-        self._found = found
+        if outcome.replayed is None:
+            raise ProblemError(f"{self.file}: {outcome.words}")
+        self._found = outcome
         live = {"exports": list(self.exports.items()), "saves": self.saves, "why": self._why}
-        self._html, radius = live_html(found.replayed, title=self.file.name, live=live)
-        self._shown.begin(radius, found.replayed.plan.robot)
+        self._html, radius = live_html(outcome.replayed, title=self.file.name, live=live)
+        self._shown.begin(radius, outcome.replayed.plan.robot)
 
     @property
-    def found(self) -> Found | None:
+    def found(self) -> Outcome | None:
         """What was found last."""
         return self._found
 
@@ -85,13 +85,13 @@ class PageSession:
     @property
     def exports(self) -> dict[str, str]:
         """Files that the motion can be exported to: their suffixes, and how they are called."""
-        found = self._found
-        if found is None or found.replayed is None or isinstance(found.replayed, PlanReplay):
+        outcome = self._found
+        if outcome is None or outcome.replayed is None or isinstance(outcome.replayed, PlanReplay):
             return _OF_PLANS
-        if found.made is None and not self.saves:
+        if outcome.made is None and not self.saves:
             # A motion of a controller's own program is there already.
             return {}
-        return _OF_PARTS if isinstance(found.made, Parts) else _OF_PROGRAMS
+        return _OF_PARTS if isinstance(outcome.made, Parts) else _OF_PROGRAMS
 
     def close(self) -> None:
         """End what works for the page."""
@@ -110,7 +110,7 @@ class PageSession:
         with self._lock:
             self._send = None
 
-    def answer(self, asked: Any) -> Json | None:
+    def answer(self, message: Any) -> Json | None:
         """Do what a page asks for; what it is to be told at once, or None.
 
         Raises
@@ -118,7 +118,7 @@ class PageSession:
         SelfmotionError
             It cannot be done; the document is as before.
         """
-        del asked
+        del message
         raise ProblemError(f"{self.file}: {self._why}")
 
     def tell(self) -> None:
@@ -126,12 +126,12 @@ class PageSession:
         # One after the other, so that an older message never comes last.
         with self._telling:
             with self._lock:
-                found, send, beside = self._found, self._send, self._beside
-                if found is None or send is None:
+                outcome, send, beside = self._found, self._send, self._beside
+                if outcome is None or send is None:
                     return
-                state = {**self._state(), "answers": self._answered(found)}
+                state = {**self._state(), "answers": self._answered(outcome)}
             # The page may go on to ask while this is made.
-            send(self._shown.message(found, state, beside))
+            send(self._shown.message(outcome, state, beside))
 
     def show_beside(self, name: str, data: bytes) -> None:
         """Show the plan of a file beside the own one; none where there are no `data`.
@@ -159,36 +159,36 @@ class PageSession:
         self.tell()
 
     def _check_beside(self, name: str, plan: Plan) -> None:
-        found = self._found
-        if found is None or not isinstance(found.replayed, PlanReplay):
+        outcome = self._found
+        if outcome is None or not isinstance(outcome.replayed, PlanReplay):
             raise ProblemError(f"{name}: a plan is shown beside a plan, and here are several seams")
-        own = found.replayed.plan.robot
-        if plan.robot.joint_names != own.joint_names or plan.robot.name != own.name:
+        robot = outcome.replayed.plan.robot
+        if plan.robot.joint_names != robot.joint_names or plan.robot.name != robot.name:
             raise ProblemError(
-                f"{name}: is of '{plan.robot.name}', expected a plan of '{own.name}' with the same "
-                f"joints"
+                f"{name}: is of '{plan.robot.name}', expected a plan of '{robot.name}' with the "
+                f"same joints"
             )
 
     def _state(self) -> Json:
         return {"sliders": [], "changed": False, "undo": False}
 
-    def _answered(self, found: Found) -> int:
+    def _answered(self, outcome: Outcome) -> int:
         """Return the number of what a page asked that is answered."""
-        del found
+        del outcome
         return 0
 
-    def _is_current(self, found: Found) -> bool:
+    def _is_current(self, outcome: Outcome) -> bool:
         """Whether it answers what was asked for last."""
-        return found.kind in ("whole", "none")
+        return outcome.kind in ("whole", "none")
 
-    def current(self, done: str) -> Found:
+    def current(self, done: str) -> Outcome:
         """Return what is shown, where all of it is planned; else PlanError: nothing is `done`."""
-        found = self._found
-        if found is None or not self._is_current(found):
+        outcome = self._found
+        if outcome is None or not self._is_current(outcome):
             raise PlanError(
                 f"what is shown is being planned; wait for its verdict, then it is {done}"
             )
-        return found
+        return outcome
 
     def export(self, suffix: str) -> bytes:
         """Return the motion as a file for a controller, or as a plan's or program's own file.
@@ -202,16 +202,16 @@ class PageSession:
         """
         if suffix not in self.exports:
             raise ProblemError(f"{suffix}: is no format, expected one of {', '.join(self.exports)}")
-        found = self.current("exported")
-        if not found.verified or found.plan is None:
-            raise PlanError(f"{found.words}; nothing is exported until it is verified")
-        made = found.plan if found.made is None else found.made
+        outcome = self.current("exported")
+        if not outcome.verified or outcome.plan is None:
+            raise PlanError(f"{outcome.words}; nothing is exported until it is verified")
+        made = outcome.plan if outcome.made is None else outcome.made
         with TemporaryDirectory(prefix="selfmotion-") as folder:
             file = Path(folder) / f"{self.file.stem}{suffix}"
             if suffix in _OWN:
                 made.save(file)
             else:
                 # Others have none.
-                own = self.settings if suffix in (".script", *PROGRAMS) else None
-                write_motion(made, file, settings=own)
+                settings = self.settings if suffix in (".script", *PROGRAMS) else None
+                write_motion(made, file, settings=settings)
             return file.read_bytes()

@@ -22,7 +22,6 @@ from selfmotion.shell.documents import SeamJob, plan_request_of, seam_job_of
 from selfmotion.shell.replay.replayed import PlanReplay
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.floor import Floor
-from selfmotion.shell.view.found import Found, NewerRequest, Request
 from selfmotion.shell.view.handles import handles_of
 from selfmotion.shell.view.maps import maps_soon
 from selfmotion.shell.view.motions import (
@@ -32,6 +31,7 @@ from selfmotion.shell.view.motions import (
     standing,
     standing_program,
 )
+from selfmotion.shell.view.requests import NewerRequest, Outcome, Request
 from selfmotion.work.job import Program
 
 # What takes longer is told where nothing else is asked for in this time [s].
@@ -52,7 +52,7 @@ class Planning:
     allow_code : bool
         Whether code that documents name is run.
     tell : callable
-        Called in that thread with each `Found`.
+        Called in that thread with each `Outcome`.
     given : (dict, Plan), optional
         A document, and its plan that is there already.
     """
@@ -61,24 +61,24 @@ class Planning:
         self,
         file: Path,
         allow_code: bool,
-        tell: Callable[[Found], None],
-        given: tuple[Mapping[str, Any], Plan] | None = None,
+        tell: Callable[[Outcome], None],
+        initial: tuple[Mapping[str, Any], Plan] | None = None,
     ) -> None:
         self._file, self._allow_code, self._tell = file, allow_code, tell
         self._wanted: Request | None = None
         self._change = threading.Condition()
         self._closed = False
         self._cache: dict[str, Any] = {}
-        self._given = given
+        self._given = initial
         # The places in reach, and what they are of; those of the request that is answered.
         self._places: tuple[Any, Floor | None] = None, None
         self._floor: dict[int, Floor | None] = {}
-        self._first: Found | None = None
+        self._first: Outcome | None = None
         self.last: Plan | None = None
         self.last_program: Program | None = None
         self._thread = threading.Thread(target=self._run, name="planning", daemon=True)
 
-    def start(self, first: Found | None = None) -> None:
+    def start(self, first: Outcome | None = None) -> None:
         """Begin to plan what is asked for, and to find more of what was found first."""
         self._first = first
         self._thread.start()
@@ -111,44 +111,44 @@ class Planning:
             done = request.number
             self._tried(request)
 
-    def _tried(self, request: Request, found: Found | None = None) -> None:
-        """Answer a request, where that is not `found` yet, and find more of it."""
+    def _tried(self, request: Request, outcome: Outcome | None = None) -> None:
+        """Answer a request, where that is not `outcome` yet, and find more of it."""
         try:
-            found = found or self.answer(request)
-            self._more(found)
+            outcome = outcome or self.answer(request)
+            self._more(outcome)
         except NewerRequest:
             return
         except Exception as error:
             # A fault of the program ends this plan, not the page.
             traceback.print_exc()
             words = f"selfmotion failed, which is a fault of the program: {error}"
-            self._tell(Found(request, "none", words, None))
+            self._tell(Outcome(request, "none", words, None))
 
-    def answer(self, request: Request) -> Found:
+    def answer(self, request: Request) -> Outcome:
         """Tell of the motions that are found for a request; return the last one."""
         if len(self._cache) > _KEPT:
             self._cache.clear()
         answers = self._programs if is_job(request.document) else self._plans
-        found = Found(request, "none", "", None)
-        for found in answers(request):
+        outcome = Outcome(request, "none", "", None)
+        for outcome in answers(request):
             # As long as the hand stays there what is found has them, too.
-            found = replace(found, floor=self._floor.get(request.number))
-            self._tell(found)
+            outcome = replace(outcome, floor=self._floor.get(request.number))
+            self._tell(outcome)
         self._leave(request)
-        return found
+        return outcome
 
-    def _more(self, found: Found) -> None:
+    def _more(self, outcome: Outcome) -> None:
         """Tell what takes longer, where nothing newer is asked for."""
-        if found.kind != "whole" or not self._is_calm(found.request):
+        if outcome.kind != "whole" or not self._is_calm(outcome.request):
             return
-        found = replace(found, is_brief=False)
-        self._tell(found)
-        maps = tuple(maps_soon(found, self._stage(found.request)))
+        outcome = replace(outcome, is_brief=False)
+        self._tell(outcome)
+        maps = tuple(maps_soon(outcome, self._stage(outcome.request)))
         if maps:
-            self._leave(found.request)
-            self._tell(replace(found, maps=maps))
+            self._leave(outcome.request)
+            self._tell(replace(outcome, maps=maps))
 
-    def _plans(self, request: Request) -> Iterator[Found]:
+    def _plans(self, request: Request) -> Iterator[Outcome]:
         """Yield what is found for a problem."""
         try:
             job = plan_request_of(
@@ -160,28 +160,28 @@ class Planning:
                     f"{' or '.join(GOALS)} (`selfmotion plan` plans it)"
                 )
         except SelfmotionError as error:
-            yield Found(request, "none", self._told(error), None)
+            yield Outcome(request, "none", self._told(error), None)
             return
         if self._given is not None and self._given[0] == request.document:
-            self.last = found = self._given[1]
-            yield Found(request, "whole", found.certificate.verdict, PlanReplay(found))
+            self.last = planned = self._given[1]
+            yield Outcome(request, "whole", planned.certificate.verdict, PlanReplay(planned))
             return
         first = self._coarse(job.problem)
         if first is not None:
-            begun = Found(request, "coarse", first.report.message, PlanReplay(first))
+            begun = Outcome(request, "coarse", first.report.message, PlanReplay(first))
             yield from self._with_floor(begun, [job.problem], [first.trajectory.q])
         self._leave(request)
         try:
-            found = self._whole(request, job)
+            planned = self._whole(request, job)
         except SelfmotionError as error:
             words = f"not verified: {self._told(error)}"
             still = standing(job.problem, self.last, words)
-            yield Found(request, "none", words, PlanReplay(still))
+            yield Outcome(request, "none", words, PlanReplay(still))
             return
-        self.last = found
-        yield Found(request, "whole", found.certificate.verdict, PlanReplay(found))
+        self.last = planned
+        yield Outcome(request, "whole", planned.certificate.verdict, PlanReplay(planned))
 
-    def _programs(self, request: Request) -> Iterator[Found]:
+    def _programs(self, request: Request) -> Iterator[Outcome]:
         """Yield what is found for a job.
 
         The program before is planned anew where it has to be, which is soon there; then the best
@@ -192,77 +192,77 @@ class Planning:
                 request.document, self._file, allow_code=self._allow_code, cache=self._cache
             )
         except SelfmotionError as error:
-            yield Found(request, "none", self._told(error), None)
+            yield Outcome(request, "none", self._told(error), None)
             return
         before = self.last_program
         if before is not None and before.robot.joint_names == job.robot.joint_names:
             first = coarse_program(job, before)
-            begun = Found(request, "coarse", first.verdict, first)
+            begun = Outcome(request, "coarse", first.verdict, first)
             near = {name: plan.trajectory.q for name, plan in before.plans.items()}
-            known = [k for k, seam in enumerate(job.seams) if seam.name in near]
-            problems = [job.problems[k] for k in known]
-            yield from self._with_floor(begun, problems, [near[job.seams[k].name] for k in known])
+            kept = [k for k, seam in enumerate(job.seams) if seam.name in near]
+            problems = [job.problems[k] for k in kept]
+            yield from self._with_floor(begun, problems, [near[job.seams[k].name] for k in kept])
             self._leave(request)
             early = self._early(request, job, before)
             if early is not None:
                 words = f"{early.verdict}; the best order is being looked for"
                 shown = shown_program(early)
-                yield Found(request, "early", words, shown, early)
+                yield Outcome(request, "early", words, shown, early)
                 self._leave(request)
         try:
-            found = job.plan(progress=self._stage(request))
+            program = job.plan(progress=self._stage(request))
         except SelfmotionError as error:
             words = f"not verified: {self._told(error)}"
             shown = standing_program(job, before, words)
             paths = tuple(seam.path for seam in job.seams)
-            yield Found(request, "none", words, shown, unmade=paths)
+            yield Outcome(request, "none", words, shown, unmade=paths)
             return
-        self.last_program = found
-        shown = shown_program(found)
-        unmade = tuple(seam.path for seam in job.seams if seam.name in found.missing)
-        yield Found(request, "whole", found.verdict, shown, found, unmade)
+        self.last_program = program
+        shown = shown_program(program)
+        unmade = tuple(seam.path for seam in job.seams if seam.name in program.missing)
+        yield Outcome(request, "whole", program.verdict, shown, program, unmade)
 
     def _with_floor(
-        self, found: Found, problems: Sequence[Problem], near: Sequence[Array]
-    ) -> Iterator[Found]:
+        self, outcome: Outcome, problems: Sequence[Problem], near: Sequence[Array]
+    ) -> Iterator[Outcome]:
         """Yield a first motion; while something is dragged with the places in reach.
 
         These are looked for once for all that is moved to and fro.
         """
-        request, plan = found.request, found.plan
+        request, plan = outcome.request, outcome.plan
         if request.drag is None or plan is None:
-            yield found
+            yield outcome
             return
         number, name = request.drag
         handle = handles_of(request.document, plan.problem).get(name)
         if handle is None:
-            yield found
+            yield outcome
             return
         pose = handle.prefix * handle.pose
         key = (number, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
-        known, floor = self._places
-        if known != key:
+        key_before, floor = self._places
+        if key_before != key:
             floor = Floor(problems, near, handle) if Floor.can_move(problems, handle) else None
             self._places = key, floor
         self._floor = {request.number: floor}
-        yield found
+        yield outcome
         # Some at least, so that they are all there in the end of a drag without a rest.
         while floor is not None and not floor.is_done:
             floor.look()
             self._leave(request)
             if floor.is_done:
-                yield found
+                yield outcome
 
     def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:
         """Return a verified program in the order before; None where there is none."""
         if job.at_feed is not None or not before.verified:
             return None
         try:
-            found = job.plan(warm_start=before, progress=self._stage(request))
+            program = job.plan(warm_start=before, progress=self._stage(request))
         except SelfmotionError:
             # Planned from nothing it is told what is wrong.
             return None
-        return found if found.verified else None
+        return program if program.verified else None
 
     def _is_calm(self, request: Request) -> bool:
         """Wait a moment; return whether nothing newer is asked for by then."""
@@ -284,8 +284,10 @@ class Planning:
             self._leave(request)
             return False
 
-        found = plan(job.problem, progress=self._stage(request), callback=iteration, **job.settings)
-        return retime(found) if job.goal == "retimed" else found
+        planned = plan(
+            job.problem, progress=self._stage(request), callback=iteration, **job.settings
+        )
+        return retime(planned) if job.goal == "retimed" else planned
 
     def _stage(self, request: Request) -> Progress:
         """Return what leaves a request at the next stage of its plan."""

@@ -14,8 +14,8 @@ from selfmotion.shell.replay.content import plan_content
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.redundancy import tree
 from selfmotion.shell.replay.replayed import PlanReplay
-from selfmotion.shell.view.found import Found
 from selfmotion.shell.view.handles import PLAN, handles_of
+from selfmotion.shell.view.requests import Outcome
 
 # The node below which what stops a plan is drawn, in red, where its path is; tubes and balls are
 # relative to the scene.
@@ -36,37 +36,39 @@ class Shown:
         """Note half the size of the scene [m], and the arm, as the page is made with them."""
         self._radius, self._robot = radius, robot
 
-    def message(self, found: Found, state: Json, beside: tuple[str, Plan] | None = None) -> bytes:
+    def message(
+        self, outcome: Outcome, state: Json, beside: tuple[str, Plan] | None = None
+    ) -> bytes:
         """Return what was found, and the state of the document, as the page reads them.
 
         With the plan that is shown `beside`, by its name.
         """
         payload = Payload()
         content: Json = {
-            "number": found.request.number,
-            "kind": found.kind,
-            "words": found.words,
-            "brief": found.is_brief,
+            "number": outcome.request.number,
+            "kind": outcome.kind,
+            "words": outcome.words,
+            "brief": outcome.is_brief,
             "beside": "" if beside is None else beside[0],
             **state,
         }
-        if found.replayed is not None:
-            plan = found.replayed.plan
+        if outcome.replayed is not None:
+            plan = outcome.replayed.plan
             content |= plan_content(
-                found.replayed,
+                outcome.replayed,
                 "plan",
                 payload,
                 radius=self._radius,
-                brief=found.is_brief,
-                maps=found.maps,
+                brief=outcome.is_brief,
+                maps=outcome.maps,
                 beside=None if beside is None else beside[1],
             )
-            if found.kind != "coarse" and not found.verified:
-                content["stopped"] = list(stopping(found, payload, self._radius))
+            if outcome.kind != "coarse" and not outcome.verified:
+                content["stopped"] = list(stopping(outcome, payload, self._radius))
             content |= self._arm(plan, payload)
-            if found.floor is not None:
-                content["floor"] = found.floor.json(payload)
-            content["handles"] = handles_json(found.request.document, plan)
+            if outcome.floor is not None:
+                content["floor"] = outcome.floor.json(payload)
+            content["handles"] = handles_json(outcome.request.document, plan)
         return payload.data(content)
 
     def _arm(self, plan: Plan, payload: Payload) -> Json:
@@ -89,16 +91,16 @@ def handles_json(document: Mapping[str, Any], plan: Plan) -> list[Json]:
     return [handle.json(plan.robot) for handle in handles.values()]
 
 
-def stopping(found: Found, payload: Payload, radius: float) -> Iterator[Json]:
+def stopping(outcome: Outcome, payload: Payload, radius: float) -> Iterator[Json]:
     """Return the commands that draw in red what stops a motion.
 
     What of the paths no motion reaches, and where the tool is when a requirement is not kept.
     """
-    if found.plan is None:
+    if outcome.plan is None:
         return
-    base = found.plan.problem.follows.items[0].chain.base_placement
+    base = outcome.plan.problem.follows.items[0].chain.base_placement
     ends, places = list[Array](), list[Array]()
-    for number, (path, reached, times) in enumerate(_stopped(found)):
+    for number, (path, reached, times) in enumerate(_stopped(outcome)):
         if reached < path.duration:
             points = _in_frame(base, path.samples(np.linspace(reached, path.duration, _POINTS)))
             kept = three.distinct(points, 0.5 * _TUBE * radius)
@@ -114,17 +116,17 @@ def stopping(found: Found, payload: Payload, radius: float) -> Iterator[Json]:
             yield _red(name, payload, three.beads(np.array(some), _BALL * radius))
 
 
-def _stopped(found: Found) -> Iterator[tuple[Path, float, list[float]]]:
+def _stopped(outcome: Outcome) -> Iterator[tuple[Path, float, list[float]]]:
     """Return paths, until when they are followed, and when something is not kept [s]."""
-    for path in found.unmade:
+    for path in outcome.unmade:
         yield path, 0.0, []
-    made = found.made
+    made = outcome.made
     if made is not None:
         plans = made.plans if isinstance(made, Parts) else made.plans.values()
         for plan in plans:
             yield plan.path, plan.path.duration, _not_kept(plan)
-    elif isinstance(found.replayed, PlanReplay):
-        plan = found.replayed.plan
+    elif isinstance(outcome.replayed, PlanReplay):
+        plan = outcome.replayed.plan
         stands = np.ptp(plan.trajectory.q, axis=0).max() == 0.0
         reached = 0.0 if stands else min(plan.trajectory.duration, plan.path.duration)
         yield plan.path, reached, [time for time in _not_kept(plan) if time <= reached]

@@ -170,70 +170,70 @@ class _Reader:
                 f"'{text[:40]}': names and geometry of part programs are not read; give the cutter "
                 f"locations that APT makes of them (GOTO/x,y,z)"
             )
-        found = _STATEMENT.fullmatch(text)
-        if not found:
+        match = _STATEMENT.fullmatch(text)
+        if not match:
             raise machine.unread(f"'{text[:60]}'")
-        word, rest = found[1], (found[2] or "").strip()
-        given = [item.strip() for item in rest.split(",")] if rest else []
+        word, rest = match[1], (match[2] or "").strip()
+        arguments = [item.strip() for item in rest.split(",")] if rest else []
         if word in _ENDS:
             return True
-        if not self._motion_statement(word, rest, given):
-            self._other_statement(text, word, rest, given)
+        if not self._motion_statement(word, rest, arguments):
+            self._other_statement(text, word, rest, arguments)
         return False
 
-    def _motion_statement(self, word: str, rest: str, given: list[str]) -> bool:
+    def _motion_statement(self, word: str, rest: str, arguments: list[str]) -> bool:
         """Take a statement about the motion of the tool; return whether it is one."""
         match word:
-            case "GOHOME" if len(given) < 3:
+            case "GOHOME" if len(arguments) < 3:
                 self._go_home()
             case "GOTO" | "FROM" | "GODLTA" | "GOHOME":
-                self._go(word, given)
+                self._go(word, arguments)
             case "CIRCLE" | "MOVARC":
-                self._arc = self._arc_of(word, given)
+                self._arc = self._arc_of(word, arguments)
             case "INDIRV":
-                self._start_direction = self._axes @ self._numbers(word, given, 3)
+                self._start_direction = self._axes @ self._numbers(word, arguments, 3)
             case "TLAXIS":
-                self._axis = self._direction(self._numbers(word, given, 3).tolist())
+                self._axis = self._direction(self._numbers(word, arguments, 3).tolist())
                 self.machine.says_axis = True
             case "RAPID" if not rest:
                 self._rapid = True
             case "FEDRAT":
-                self._feed(given)
+                self._feed(arguments)
             case _:
                 return False
         return True
 
-    def _other_statement(self, text: str, word: str, rest: str, given: list[str]) -> None:
+    def _other_statement(self, text: str, word: str, rest: str, arguments: list[str]) -> None:
         """Take any other statement, or refuse it."""
         machine = self.machine
         match word:
             case "UNITS" | "UNIT":
-                if len(given) != 1 or given[0] not in _UNITS:
+                if len(arguments) != 1 or arguments[0] not in _UNITS:
                     raise machine.fault(f"{word}/{rest[:40]}: expected MM or INCHES")
-                self._set_unit(_UNITS[given[0]])
-            case "MODE" | "SET" if "INCR" in given:
+                self._set_unit(_UNITS[arguments[0]])
+            case "MODE" | "SET" if "INCR" in arguments:
                 raise machine.fault(
                     f"{word}/{rest[:40]}: places by differences are not read; write MODE/ABSOL"
                 )
             case "CUTCOM":
-                self._compensate(given)
+                self._compensate(arguments)
             case "CYCLE":
-                self._set_cycle(given)
+                self._set_cycle(arguments)
             case "NURBS":
                 raise machine.fault(
                     "NURBS: splines are not read; let CAM write lines or arcs (NX: motion output)"
                 )
             case "TRNTYP" | "CSYS":
-                self._frame(word, given)
+                self._frame(word, arguments)
             case "MSYS":
-                self._set_machine_frame(self._numbers(word, given, 9))
+                self._set_machine_frame(self._numbers(word, arguments, 9))
             case "OFSTNO":
                 self._require_unchanged(
                     word, rest, "another zero of the control: write one file for each"
                 )
-            case "SETUP" if given[:1] in (["START"], ["END"]):
+            case "SETUP" if arguments[:1] in (["START"], ["END"]):
                 self._require_unchanged(
-                    word, ",".join(given[1:]), "another way to hold the part: one file each"
+                    word, ",".join(arguments[1:]), "another way to hold the part: one file each"
                 )
             case "LOADTL" | "LOAD":
                 if self._first.setdefault("LOADTL", rest) != rest:
@@ -241,7 +241,7 @@ class _Reader:
                         f"{word}/{rest[:40]}: another tool than {self._first['LOADTL'][:40]}"
                     )
             case _ if word in _EVENTS:
-                machine.happens(f"{word}/{','.join(given)}" if given else word)
+                machine.happens(f"{word}/{','.join(arguments)}" if arguments else word)
             case _ if word in _HARMLESS and rest.replace(" ", "") in _HARMLESS[word]:
                 pass
             case "OPSKIP":
@@ -269,8 +269,8 @@ class _Reader:
 
     def _position(self, values: Sequence[float]) -> Array:
         """Return a position of the file (3,) in its first frame [m]."""
-        found: Array = self._origin + self._axes @ (self._unit * np.array(values))
-        return found
+        position: Array = self._origin + self._axes @ (self._unit * np.array(values))
+        return position
 
     def _direction(self, values: Sequence[float]) -> Array:
         """Return a direction (3,) of the file in its first frame."""
@@ -324,9 +324,9 @@ class _Reader:
                 f"are: unit = 'in' or 'mm' (--unit)"
             )
 
-    def _go(self, word: str, given: list[str]) -> None:
+    def _go(self, word: str, arguments: list[str]) -> None:
         machine = self.machine
-        values = [self._number(text) for text in given]
+        values = [self._number(text) for text in arguments]
         if len(values) not in (3, 6) or (word == "GODLTA" and len(values) != 3):
             raise machine.fault(f"{word} has {len(values)} numbers, expected x,y,z or x,y,z,i,j,k")
         position = self._position(values[:3])
@@ -343,44 +343,44 @@ class _Reader:
         else:
             self._move_to(position, axis, travels=self._rapid or travels)
 
-    def _set_cycle(self, given: list[str]) -> None:
+    def _set_cycle(self, arguments: list[str]) -> None:
         """Take a drilling cycle: its kind, and its words, each with a number after it."""
-        machine, statement = self.machine, f"CYCLE/{','.join(given)[:40]}"
-        if given[:1] in (["OFF"], ["INIT"], ["CLEAR"]):
+        machine, statement = self.machine, f"CYCLE/{','.join(arguments)[:40]}"
+        if arguments[:1] in (["OFF"], ["INIT"], ["CLEAR"]):
             self._cycle = {}
             return
-        if given[:1] != ["ON"]:
+        if arguments[:1] != ["ON"]:
             self._cycle = {}
-        items = given[1:] if given[:1] in (["ON"], ["DRILL"]) else list(given)
-        found = dict(self._cycle)
+        items = arguments[1:] if arguments[:1] in (["ON"], ["DRILL"]) else list(arguments)
+        cycle = dict(self._cycle)
         # The meaning of numbers without a word before them, in order.
         bare = ["FEDTO", "CLEAR"]
         while items:
             word = items.pop(0)
             if word in _PECKS:
-                found[word[:4]] = 1.0
+                cycle[word[:4]] = 1.0
             elif word == "RTRCTO" and items[:1] == ["AUTO"]:
                 # Back to the height before the cycle.
                 items.pop(0)
-                found["AUTO"] = 1.0
+                cycle["AUTO"] = 1.0
                 self._position_before_cycle = machine.position.copy()
             elif word in _CYCLE_WORDS and items:
-                found[word] = self._number(items.pop(0))
+                cycle[word] = self._number(items.pop(0))
             elif _NUMBER.fullmatch(word) and bare:
-                found[bare.pop(0)] = self._number(word)
+                cycle[bare.pop(0)] = self._number(word)
             else:
                 raise machine.fault(
                     f"{statement}: '{word}' of a cycle is not read, but DRILL, DEEP and BRKCHP "
                     f"are; let CAM write the moves (GOTO, RAPID)"
                 )
-        if not {"FEDTO", "DEPTH"} & set(found) or not {"RAPTO", "CLEAR"} & set(found):
+        if not {"FEDTO", "DEPTH"} & set(cycle) or not {"RAPTO", "CLEAR"} & set(cycle):
             raise machine.fault(
                 f"{statement}: expected a depth (FEDTO) and a height (RAPTO or CLEAR)"
             )
         for word in ("MMPM", "IPM"):
-            if word in found:
-                self._feed([str(found.pop(word)), word])
-        self._cycle = found
+            if word in cycle:
+                self._feed([str(cycle.pop(word)), word])
+        self._cycle = cycle
 
     def _drill_hole(self, top: Array, axis: Array) -> None:
         """Drill a hole of the cycle, whose top is given."""
@@ -435,17 +435,21 @@ class _Reader:
         self._move_to(np.full(3, np.nan), machine.axis, travels=True)
         machine.note_home("GOHOME", "the next GOTO")
 
-    def _arc_of(self, word: str, given: list[str]) -> _Arc:
+    def _arc_of(self, word: str, arguments: list[str]) -> _Arc:
         """Return the circle of ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC/x,y,z,i,j,k,r,ANGLE,a``."""
-        numbers = [item for item in given if item not in ("TIMES", "ANGLE")]
+        numbers = [item for item in arguments if item not in ("TIMES", "ANGLE")]
         values = [self._number(text) for text in numbers]
         if len(values) < 6:
             raise self.machine.fault(
                 f"{word} has {len(values)} numbers, expected x,y,z of its centre, i,j,k of its "
                 f"axis and its radius"
             )
-        is_left = word == "CIRCLE" and len(values) - ("TIMES" in given) >= _NX_ARC_FIELDS
-        turns = values[-1] if "TIMES" in given else values[-1] / 360.0 if "ANGLE" in given else 1.0
+        is_left = word == "CIRCLE" and len(values) - ("TIMES" in arguments) >= _NX_ARC_FIELDS
+        turns = 1.0
+        if "TIMES" in arguments:
+            turns = values[-1]
+        elif "ANGLE" in arguments:
+            turns = values[-1] / 360.0
         if not 0.0 < turns <= _TURNS:
             raise self.machine.fault(f"{word} goes round {turns:g} times, expected up to {_TURNS}")
         axis = self._direction(values[3:6])
@@ -472,37 +476,37 @@ class _Reader:
         tool = machine.axis if self._axis is None else self._axis
         self._move_to(goal, tool, travels=self._rapid)
 
-    def _compensate(self, given: list[str]) -> None:
-        if given[:1] != ["OFF"]:
+    def _compensate(self, arguments: list[str]) -> None:
+        if arguments[:1] != ["OFF"]:
             self.machine.note(
-                f"CUTCOM/{','.join(given)}: places are taken as they are written, those of the "
+                f"CUTCOM/{','.join(arguments)}: places are taken as they are written, those of the "
                 f"tool's centre: no radius is added"
             )
 
-    def _frame(self, word: str, given: list[str]) -> None:
+    def _frame(self, word: str, arguments: list[str]) -> None:
         """Take the frame of coordinates: only one frame is read."""
         if word == "TRNTYP":
-            self._in_world = given[:1] == ["WORLD"]
+            self._in_world = arguments[:1] == ["WORLD"]
         is_same = self._in_world
         if word == "CSYS" and not is_same:
-            is_same = np.abs(self._numbers(word, given, 12) - np.eye(3, 4).ravel()).max() < 1e-9
+            is_same = np.abs(self._numbers(word, arguments, 12) - np.eye(3, 4).ravel()).max() < 1e-9
         if not is_same:
             raise self.machine.fault(
-                f"{word}/{','.join(given)[:40]}: frames that are turned or moved are not read; let "
-                f"CAM write all places in one frame (TRNTYP/WORLD)"
+                f"{word}/{','.join(arguments)[:40]}: frames that are turned or moved are not read; "
+                f"let CAM write all places in one frame (TRNTYP/WORLD)"
             )
 
-    def _numbers(self, word: str, given: list[str], count: int) -> Array:
-        if len(given) != count:
-            raise self.machine.fault(f"{word} has {len(given)} numbers, expected {count}")
-        return np.array([self._number(text) for text in given])
+    def _numbers(self, word: str, arguments: list[str], count: int) -> Array:
+        if len(arguments) != count:
+            raise self.machine.fault(f"{word} has {len(arguments)} numbers, expected {count}")
+        return np.array([self._number(text) for text in arguments])
 
-    def _feed(self, given: list[str]) -> None:
-        units = [item for item in given if item in _FEEDS]
-        numbers = [item for item in given if item not in _FEEDS]
+    def _feed(self, arguments: list[str]) -> None:
+        units = [item for item in arguments if item in _FEEDS]
+        numbers = [item for item in arguments if item not in _FEEDS]
         if len(numbers) != 1 or len(units) > 1:
             raise self.machine.fault(
-                f"FEDRAT/{','.join(given)[:40]}: expected a feed, and MMPM or IPM"
+                f"FEDRAT/{','.join(arguments)[:40]}: expected a feed, and MMPM or IPM"
             )
         scale = _FEEDS[units[0]] if units else None
         if scale is not None:

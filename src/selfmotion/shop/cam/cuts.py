@@ -124,25 +124,25 @@ def _transported(axes: Array) -> Array:
     """Return rotations whose z axes are (N, 3), each turned from the last one about no z axis."""
     from scipy.spatial.transform import Rotation
 
-    found = [from_normal(axes[0])]
+    frames = [from_normal(axes[0])]
     for axis in axes[1:]:
-        before = found[-1][:, 2]
+        before = frames[-1][:, 2]
         if (axis == before).all():
-            found.append(found[-1])
+            frames.append(frames[-1])
             continue
         cross, cosine = np.cross(before, axis), float(before @ axis)
         if cosine < _OPPOSITE - 1.0:
-            found.append(from_normal(axis))
+            frames.append(from_normal(axis))
             continue
         sine = float(np.linalg.norm(cross))
         angle = np.arctan2(sine, cosine)
         turn = Rotation.from_rotvec(cross * (angle / sine if sine > 0.0 else 0.0))
-        turned = turn.as_matrix() @ found[-1]
+        turned = turn.as_matrix() @ frames[-1]
         # Exactly that axis, after many turns too.
         x = turned[:, 0] - axis * (axis @ turned[:, 0])
         x = x / np.linalg.norm(x)
-        found.append(np.stack([x, np.cross(axis, x), axis], axis=1))
-    return np.array(found)
+        frames.append(np.stack([x, np.cross(axis, x), axis], axis=1))
+    return np.array(frames)
 
 
 class Machine:
@@ -183,11 +183,11 @@ class Machine:
 
     def unread(self, what: str) -> FileFormatError:
         """Return an error about something that is not read."""
-        own = (
+        siemens_words = (
             "of what only Siemens' controls know, TRAORI, TRAFOOF, X=… and A3= B3= C3= are read: "
             "let CAM write ISO G-code for the rest, or APT; "
         )
-        siemens = own if self.file.suffix.lower() == _SIEMENS_SUFFIX else ""
+        siemens = siemens_words if self.file.suffix.lower() == _SIEMENS_SUFFIX else ""
         return self.fault(
             f"{what} is not read: {siemens}page 'Words of CAM files' of the docs lists what is "
             f"(read_path)"
@@ -443,10 +443,10 @@ def arc_points(
         raise machine.fault(f"the arc takes {count} chords, expected {_MAX_POINTS} at most")
     share = np.arange(1, count + 1)[:, None] / count
     angle, radii = turn * share, radius + (other - radius) * share
-    found = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
-    found = found + (heights[0] + (heights[1] - heights[0]) * share) * axis
-    found[-1] = goal
-    return np.asarray(found)
+    points = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
+    points = points + (heights[0] + (heights[1] - heights[0]) * share) * axis
+    points[-1] = goal
+    return np.asarray(points)
 
 
 def center_by_radius(
@@ -561,8 +561,8 @@ def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
         raise machine.fault(
             f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
         )
-    found, here = list[float](), pecks.first
+    depths, here = list[float](), pecks.first
     while here < depth - _SAME_POSE:
-        found.append(here)
+        depths.append(here)
         here += pecks.others
-    return [*found, depth]
+    return [*depths, depth]

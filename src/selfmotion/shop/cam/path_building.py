@@ -75,8 +75,8 @@ class Pacing:
     def bounds(self) -> dict[str, float]:
         """Bounds of a feed that are given."""
         names = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
-        given = {name: getattr(self, name) for name in names}
-        return {name: value for name, value in given.items() if value is not None}
+        limits = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in limits.items() if value is not None}
 
 
 def path_of_rows(path: FilePath, rows: PoseRows, pacing: Pacing) -> Path:
@@ -112,12 +112,12 @@ def path_of_rows(path: FilePath, rows: PoseRows, pacing: Pacing) -> Path:
         else:
             made = _table_path(path, rows, turns, pacing)
         is_ramped = pacing.ramp is not None and pacing.duration is None
-        found = section_at_rest(made, ramp=pacing.ramp or 0.0) if is_ramped else made
+        ramped = section_at_rest(made, ramp=pacing.ramp or 0.0) if is_ramped else made
     # Splines refuse times that differ, but by less than they can divide by.
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
     turned = (TURN_NOTE,) if rows.orientation == "normal" else ()
-    return found.noted((*rows.notes, *made.notes, *turned))
+    return ramped.noted((*rows.notes, *made.notes, *turned))
 
 
 def _check_corners(pacing: Pacing) -> None:
@@ -330,13 +330,13 @@ def _aligned_path(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
     axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
     rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
     bend = _CORNER_ANGLE if pacing.corner_angle is None else pacing.corner_angle
-    found = sections_along(rows.positions, axes, rapid, along, (pacing.lead, pacing.tilt), bend)
+    aligned = sections_along(rows.positions, axes, rapid, along, (pacing.lead, pacing.tilt), bend)
     sections: list[_CutSection] = []
-    for number, (first, last, turns) in enumerate(found):
+    for number, (first, last, turns) in enumerate(aligned):
         if number:
-            before = turning(found[number - 1].rotations[-1], turns[0])
+            before = turning(aligned[number - 1].rotations[-1], turns[0])
             # Of two cuts: a rapid leaves the part by itself.
-            beside_rapid = rapid[found[number - 1].first] or rapid[first]
+            beside_rapid = rapid[aligned[number - 1].first] or rapid[first]
             is_lifted = pacing.lift > 0.0 and not beside_rapid
             offset = -pacing.lift * axes[first] if is_lifted else np.zeros(3)
             sections += _turn_sections(
@@ -345,7 +345,7 @@ def _aligned_path(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
         part = slice(first, last + 1)
         sections.append(_CutSection(rows.positions[part], turns, feeds[part], bool(rapid[first])))
     if pacing.corners == "round":
-        sections = _joined_sections(sections, [bool(rapid[item.first]) for item in found])
+        sections = _joined_sections(sections, [bool(rapid[item.first]) for item in aligned])
     paths: list[Path] = []
     for points, turns, own, is_free in sections:
         if not is_free or np.ptp(points, axis=0).max() > 0.0 or _rotates(turns):
@@ -379,23 +379,23 @@ def _rotates(turns: Array) -> bool:
 
 def _joined_sections(sections: Sequence[_CutSection], rapid: Sequence[bool]) -> list[_CutSection]:
     """Return sections of which those at a feed, and turns between two of them, are one."""
-    found: list[_CutSection] = []
+    merged: list[_CutSection] = []
     for number, section in enumerate(sections):
         # Turns stand between the sections of legs.
-        beside = rapid[number // 2 : number // 2 + 1 + number % 2]
-        at_feed = not any(beside)
-        if found and at_feed and not found[-1].is_free:
-            last = found[-1]
+        is_rapid = rapid[number // 2 : number // 2 + 1 + number % 2]
+        at_feed = not any(is_rapid)
+        if merged and at_feed and not merged[-1].is_free:
+            last = merged[-1]
             pairs = (
                 (last.positions, section.positions),
                 (last.rotations, section.rotations),
                 (last.feeds, section.feeds),
             )
             joined = [np.concatenate([one, other[1:]]) for one, other in pairs]
-            found[-1] = _CutSection(joined[0], joined[1], joined[2], False)
+            merged[-1] = _CutSection(joined[0], joined[1], joined[2], False)
         else:
-            found.append(section._replace(is_free=not at_feed))
-    return found
+            merged.append(section._replace(is_free=not at_feed))
+    return merged
 
 
 def _rest_poses(positions: Array, turns: Array, pacing: Pacing) -> Ints:
@@ -414,16 +414,16 @@ def _rest_poses(positions: Array, turns: Array, pacing: Pacing) -> Ints:
 
 def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
     """Return feeds (N,) without those that hold for less length than the tolerance."""
-    found = feeds.copy()
+    steady = feeds.copy()
     steps = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
     edges = [0, *(1 + np.flatnonzero(np.diff(feeds[:-1]))).tolist(), len(feeds)]
     before: float | None = None
     for first, last in reversed(list(pairwise(edges))):
         # A start that is as short goes at what follows it.
         if before is not None and steps[first:last].sum() < tolerance:
-            found[first:last] = before
-        before = float(found[first])
-    return found
+            steady[first:last] = before
+        before = float(steady[first])
+    return steady
 
 
 def _without_stubs(rows: PoseRows, rotations: Array, pacing: Pacing) -> tuple[PoseRows, Array]:
@@ -481,8 +481,8 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
         far = np.argwhere(np.abs(values) > bound)
         if len(far):
             row, column = far[0]
-            found = f"{what} {values[row, column]:.6g}"
-            raise FileFormatError(f"{file}: {rows.labels[row]}: {found} is taken for {remedy}")
+            value = f"{what} {values[row, column]:.6g}"
+            raise FileFormatError(f"{file}: {rows.labels[row]}: {value} is taken for {remedy}")
     if rows.t is not None:
         late = np.flatnonzero(np.diff(rows.t) <= 0.0)
         if late.size:
@@ -497,14 +497,14 @@ def _rotations(file: FilePath, rows: PoseRows) -> Array:
     if not rows.orientation:
         return np.tile(np.eye(3), (len(rows.positions), 1, 1))
     _, rotation = ORIENTATIONS[rows.orientation]
-    found = list[Array]()
+    rotations = list[Array]()
     for k, (label, values) in enumerate(zip(rows.labels, rows.values, strict=True)):
         try:
             again = k > 0 and np.array_equal(values, rows.values[k - 1])
-            found.append(found[-1] if again else rotation(values))
+            rotations.append(rotations[-1] if again else rotation(values))
         except (ValueError, PathError) as error:
             raise FileFormatError(f"{file}: {label}: {error}") from error
-    return np.array(found)
+    return np.array(rotations)
 
 
 def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
@@ -559,9 +559,9 @@ def _times(
     *,
     turns_in_place: bool,
 ) -> Array:
-    given = {"feed": feed, "duration": duration}
-    named = [name for name, value in given.items() if value is not None]
-    columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
+    options = {"feed": feed, "duration": duration}
+    named = [name for name, value in options.items() if value is not None]
+    columns = [name for name, column in (("t", rows.t), ("feed", rows.feed)) if column is not None]
     if len(columns) > 1:
         raise FileFormatError(f"{file}: has times and a column feed; keep one of them")
     if columns and named:

@@ -128,21 +128,21 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
             raise FileFormatError(
                 f"{file}: line {number} has {len(cells)} values, expected {len(titles)}"
             )
-        found = dict(zip(titles, cells, strict=True))
-        values = {key: _number(file, number, found[key]) for key in _IRBCAM}
-        kind = _number(file, number, found.get("motion_type", "0"))
+        row = dict(zip(titles, cells, strict=True))
+        values = {key: _number(file, number, row[key]) for key in _IRBCAM}
+        kind = _number(file, number, row.get("motion_type", "0"))
         if kind not in (0.0, 1.0) or (
             kind == 1.0 and (not rows or middles[-1:] == [len(rows) - 1])
         ):
             raise FileFormatError(
-                f"{file}: line {number}: motion_type {found['motion_type']} is not read here, "
+                f"{file}: line {number}: motion_type {row['motion_type']} is not read here, "
                 f"expected 0 (a line), or 1 for the point between both ends of an arc of IRBCAM"
             )
         if kind == 1.0:
             middles.append(len(rows))
         lines.append(number)
         rows.append([values[key] for key in _IRBCAM])
-        feeds.append(_MM * _number(file, number, found.get("velocity", "0")))
+        feeds.append(_MM * _number(file, number, row.get("velocity", "0")))
         labels.append(f"line {number}")
     if middles[-1:] == [len(rows) - 1]:
         raise FileFormatError(
@@ -170,7 +170,7 @@ def _with_arcs(
     file: FilePath, lines: Sequence[int], middles: Sequence[int], positions: Array, turns: Array
 ) -> tuple[list[int], Array, Array]:
     """Return poses with arcs as chords, and which row each is of."""
-    chosen, points_of_steps, found = [0], [positions[:1]], [turns[:1]]
+    chosen, points_of_steps, rotations = [0], [positions[:1]], [turns[:1]]
     for k in range(1, len(positions)):
         steps = [positions[k : k + 1]]
         if k in middles:
@@ -180,8 +180,8 @@ def _with_arcs(
         for row, points in enumerate(steps, k):
             chosen += [row] * len(points)
             points_of_steps.append(points)
-            found.append(_turning(turns[row - 1], turns[row], len(points)))
-    return chosen, np.concatenate(points_of_steps), np.concatenate(found)
+            rotations.append(_turning(turns[row - 1], turns[row], len(points)))
+    return chosen, np.concatenate(points_of_steps), np.concatenate(rotations)
 
 
 def _straight(
@@ -194,14 +194,14 @@ def _straight(
 ) -> PoseRows:
     """Return rows that the tool goes straight through, in rapids where a feed is below 0."""
     rapid = None if feeds is None or not (feeds < 0.0).any() else feeds < 0.0
-    known = feeds is not None and bool((feeds[:-1] != 0.0).all())
+    are_feeds = feeds is not None and bool((feeds[:-1] != 0.0).all())
     return PoseRows(
         labels,
         positions,
         orientation,
         values,
         None,
-        np.abs(feeds) if known and feeds is not None else None,
+        np.abs(feeds) if are_feeds and feeds is not None else None,
         straight=True,
         one_way=True,
         notes=(note,),
@@ -252,12 +252,12 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
     reader = csv.DictReader(io.StringIO(text))
     try:
         reader.fieldnames = [name.strip().lower() for name in reader.fieldnames or ()]
-        listed = [(reader.line_num, found) for found in reader]
+        listed = [(reader.line_num, row) for row in reader]
     except csv.Error as error:
         raise FileFormatError(f"{file}: line {reader.line_num}: is no table: {error}") from error
     rows, labels = list[Array](), list[str]()
-    for where, found in listed:
-        kind, points = str(found.get("primitives")), _ARRAY.findall(str(found.get("points")))
+    for where, row in listed:
+        kind, points = str(row.get("primitives")), _ARRAY.findall(str(row.get("points")))
         expected = next((n for name, n in _POINTS.items() if kind.lower().startswith(name)), 0)
         if not expected or len(points) != expected or (expected == 2 and not rows):
             raise FileFormatError(
@@ -265,10 +265,10 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
                 f"is not read, expected movel or movej with one, or movec with two (between both "
                 f"ends of an arc, and its end) after a first point"
             )
-        given = [[_number(file, where, cell) for cell in each.split(",")] for each in points]
-        if any(len(values) != 3 for values in given):
+        poses = [[_number(file, where, cell) for cell in each.split(",")] for each in points]
+        if any(len(values) != 3 for values in poses):
             raise FileFormatError(f"{file}: line {where}: expected x, y, z in points")
-        ends = _MM * np.array(given)
+        ends = _MM * np.array(poses)
         added = ends if expected == 1 else np.concatenate(_arc(file, where, rows[-1], *ends))
         rows += list(added)
         labels += [f"line {where}"] * len(added)
@@ -363,7 +363,7 @@ def _frames(
 
 
 def _print_points(file: FilePath, document: Mapping[str, Any]) -> Mapping[str, PoseRows]:
-    found: dict[str, PoseRows] = {}
+    seams: dict[str, PoseRows] = {}
     note = "compas_slicer: points in mm, velocity in mm/s; wait_time and heights are passed over"
     for layer, paths in document.items():
         for path, points in paths.items():
@@ -380,22 +380,22 @@ def _print_points(file: FilePath, document: Mapping[str, Any]) -> Mapping[str, P
             for number, (first, last) in enumerate(_runs(prints), 1):
                 part = slice(first, last + 1)
                 whole = first == 0 and last == len(items) - 1
-                found[name if whole else f"{name} {number}"] = _straight(
+                seams[name if whole else f"{name} {number}"] = _straight(
                     labels[part], _MM * positions[part], "rotation", turns[part], feeds[part], note
                 )
-    if not found:
+    if not seams:
         raise FileFormatError(f"{file}: nothing of it extrudes (extruder_toggle)")
-    return {"": next(iter(found.values()))} if len(found) == 1 else found
+    return {"": next(iter(seams.values()))} if len(seams) == 1 else seams
 
 
 def _runs(prints: Sequence[bool]) -> list[tuple[int, int]]:
     """Return the first and last points of what is printed: each point extrudes to the next one."""
-    found, first = list[tuple[int, int]](), -1
+    runs, first = list[tuple[int, int]](), -1
     for k, extrudes in enumerate(prints):
         if extrudes and first < 0:
             first = k
         if first >= 0 and (not extrudes or k == len(prints) - 1):
             if k > first:
-                found.append((first, k))
+                runs.append((first, k))
             first = -1
-    return found
+    return runs

@@ -88,15 +88,15 @@ class ArcLength:
 
     def at(self, times: Array) -> Array:
         """Return how far it has gone at times (K,) [m]."""
-        found: Array = self._spline(np.clip(times, self.t[0], self.t[-1]))
-        return np.clip(found, 0.0, self.whole)
+        lengths: Array = self._spline(np.clip(times, self.t[0], self.t[-1]))
+        return np.clip(lengths, 0.0, self.whole)
 
     def when(self, lengths: Array) -> Array:
         """Return when it has gone as far as lengths (K,) [s]; at both ends the first and last."""
         k = np.clip(np.searchsorted(self.length, lengths) - 1, 0, len(self.t) - 2)
-        found = times_when(self._spline, lengths, self.t[k], self.t[k + 1])
-        found = np.where(lengths <= 0.0, self.t[0], found)
-        return np.asarray(np.where(lengths >= self.whole, self.t[-1], found))
+        when = times_when(self._spline, lengths, self.t[k], self.t[k + 1])
+        when = np.where(lengths <= 0.0, self.t[0], when)
+        return np.asarray(np.where(lengths >= self.whole, self.t[-1], when))
 
     @cached_property
     def _spline(self) -> Any:
@@ -149,18 +149,18 @@ class Ramps(NamedTuple):
         """Return which times without ramps are reached at times (K,) with ramps [s]."""
         ramp, top = self.each, self.whole / (self.seconds - self.each)
         begin, end = np.clip(times, 0.0, ramp), np.clip(self.seconds - times, 0.0, ramp)
-        found = top * (times - 0.5 * ramp)
-        found = np.where(times < ramp, 0.5 * top * begin**2 / ramp, found)
+        passed = top * (times - 0.5 * ramp)
+        passed = np.where(times < ramp, 0.5 * top * begin**2 / ramp, passed)
         last = self.whole - 0.5 * top * end**2 / ramp
-        return np.asarray(np.where(times > self.seconds - ramp, last, found))
+        return np.asarray(np.where(times > self.seconds - ramp, last, passed))
 
     def times(self, passed: Array) -> Array:
         """Return when times without ramps (K,) are reached with ramps [s]."""
         ramp, top = self.each, self.whole / (self.seconds - self.each)
         sides = passed, self.whole - passed
         up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in sides)
-        found = np.where(up < ramp, up, passed / top + 0.5 * ramp)
-        return np.asarray(np.where(down < ramp, self.seconds - down, found))
+        times = np.where(up < ramp, up, passed / top + 0.5 * ramp)
+        return np.asarray(np.where(down < ramp, self.seconds - down, times))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -236,12 +236,12 @@ class FeedSegment(PoseSegment):
 
         The one that the program states is the first.
         """
-        found: list[Curve] = [self._stepped]
+        curves: list[Curve] = [self._stepped]
         if len(self.t) > 2:
-            found.append(self._rounded)
+            curves.append(self._rounded)
             if not np.isfinite(self.vias).any():
-                found.append(self.spline)
-        return found[::-1] if self.is_spline else found
+                curves.append(self.spline)
+        return curves[::-1] if self.is_spline else curves
 
     @override
     def motions(self) -> Iterator[Knots]:
@@ -262,12 +262,12 @@ class FeedSegment(PoseSegment):
 
     def at_pace(self, travel: ArcLength) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace at which something else has gone as far."""
-        own = np.interp(
+        lengths = np.interp(
             travel.at(travel.t) * (self.lengths[-1] / travel.whole),
             self.lengths,
             self.t,
         )
-        return self._driven(travel.t - travel.t[0], own)
+        return self._driven(travel.t - travel.t[0], lengths)
 
     def along(self, path: Path, first: float) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace of a path that it begins at `first` [s].

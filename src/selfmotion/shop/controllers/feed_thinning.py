@@ -91,8 +91,8 @@ class FeedSection(PoseSection):
                 part._fewest_targets(each, nearer, turning)
                 for part, each in zip(parts, travel, strict=True)
             ]
-            found = [segment for segment in made if isinstance(segment, FeedSegment)]
-            if len(found) < len(parts):
+            feed_segments = [segment for segment in made if isinstance(segment, FeedSegment)]
+            if len(feed_segments) < len(parts):
                 # Where it is with the most that may be off.
                 stuck = stuck or next(at for at in made if not isinstance(at, FeedSegment))
                 why = self._failure_text(stuck, allowed)
@@ -102,11 +102,11 @@ class FeedSection(PoseSection):
                 "the feed itself): leave more room, or take a lower feed"
             )
             if not all(
-                part._has_timely_events(own) for part, own in zip(parts, found, strict=True)
+                part._has_timely_events(own) for part, own in zip(parts, feed_segments, strict=True)
             ):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
-            elif self._is_valid(found, travel, allowed):
-                pairs = zip(parts, found, strict=True)
+            elif self._is_valid(feed_segments, travel, allowed):
+                pairs = zip(parts, feed_segments, strict=True)
                 return [(segment, part._deviation(segment)) for part, segment in pairs]
         ((timed, deviation),) = super().segments(allowed)
         return [(replace(timed, remark=f"{TIMES_HEADING}{why}"), deviation)]
@@ -157,10 +157,10 @@ class FeedSection(PoseSection):
             motion.t < self.first - _EVENT_TOLERANCE,
             motion.t > self.last + _EVENT_TOLERANCE,
         )
-        given = motion.t, motion.q, motion.qd
+        planned = motion.t, motion.q, motion.qd
         whole = [
             np.concatenate([own[before], *each, own[after]])
-            for own, each in zip(given, zip(*rows, strict=True), strict=True)
+            for own, each in zip(planned, zip(*rows, strict=True), strict=True)
         ]
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
         return self.operation.keeps is not None and self.operation.keeps(judged, allowed)
@@ -169,9 +169,9 @@ class FeedSection(PoseSection):
         """Whether there is time for the ramps, and events are on time with even ramps."""
         if not segment.ramps.each > 0.0:
             return False
-        own = segment.ramps.times(segment.t)
+        target_times = segment.ramps.times(segment.t)
         return all(
-            abs(own[event.target] - (at - self.first)) < _EVENT_TOLERANCE
+            abs(target_times[event.target] - (at - self.first)) < _EVENT_TOLERANCE
             for event, (at, _) in zip(segment.events, self.events, strict=True)
         )
 
@@ -251,7 +251,7 @@ class FeedSection(PoseSection):
             # A halved step may be too short for an arc: it is linear then.
             if arc is not None and arc.is_meant:
                 vias[k] = via
-        found, arrived = self.frames.inverse_kinematics(
+        joints, arrived = self.frames.inverse_kinematics(
             positions, quaternions, self._mixed(along.q[ends], q)
         )
         if not arrived.all():
@@ -272,7 +272,7 @@ class FeedSection(PoseSection):
         return FeedSegment(
             self.operation.name,
             times,
-            found,
+            joints,
             tuple(events),
             positions=positions,
             quaternions=aligned_quaternions(quaternions),
@@ -287,13 +287,13 @@ class FeedSection(PoseSection):
     def _speeds(self, travel: ArcLength, ends: Array) -> Array:
         """Return the feed of each step; for leads the speed that takes their duration [m/s]."""
         middles = travel.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
-        found = np.full(
+        speeds = np.full(
             len(middles), travel.whole / ((1.0 - _RAMP_SHARE) * (self.last - self.first))
         )
         for item in self.operation.feeds[0]:
             for begin, end in item.during:
-                found[(middles >= begin) & (middles <= end)] = item.asked
-        return np.round(found, _SPEED_DIGITS)
+                speeds[(middles >= begin) & (middles <= end)] = item.asked
+        return np.round(speeds, _SPEED_DIGITS)
 
     def _deviation_shares(self, segment: FeedSegment, allowed: Allowed) -> Array | float:
         """Return the deviation of each step as a share of its tolerance, (K,).

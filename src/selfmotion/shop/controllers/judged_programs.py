@@ -167,12 +167,15 @@ def judged_interpolations(
     """
     worst: tuple[Certificate, Trajectory] | None = None
     for number, motion in enumerate(motions):
-        found = (judge if judge_lines is None or not number else judge_lines)(motion)
-        if not found.verified:
-            said = (*found.failures[:-1], f"{found.failures[-1]}{_STRAIGHT if number else ''}")
-            return replace(found, failures=said), motion
-        if worst is None or found.position_error.value > worst[0].position_error.value:
-            worst = found, motion
+        certificate = (judge if judge_lines is None or not number else judge_lines)(motion)
+        if not certificate.verified:
+            said = (
+                *certificate.failures[:-1],
+                f"{certificate.failures[-1]}{_STRAIGHT if number else ''}",
+            )
+            return replace(certificate, failures=said), motion
+        if worst is None or certificate.position_error.value > worst[0].position_error.value:
+            worst = certificate, motion
     if worst is None:
         raise ProblemError("there is no motion to judge")
     return worst
@@ -263,11 +266,11 @@ def _off_moves(
     if program.shift is not None:
         yield from _shifted_moves(program, job, parts)
         return
-    _, stated, found = program_deviation(job, file, program)
-    if any(one > other + 1e-9 for one, other in zip(found.moves, stated.moves, strict=True)):
+    _, stated, deviations = program_deviation(job, file, program)
+    if any(one > other + 1e-9 for one, other in zip(deviations.moves, stated.moves, strict=True)):
         yield (
-            f"free moves are up to {1e3 * found.moves.position:.4g} mm, joints "
-            f"{found.moves.joint:.4g} rad or m off those of the job, the file states "
+            f"free moves are up to {1e3 * deviations.moves.position:.4g} mm, joints "
+            f"{deviations.moves.joint:.4g} rad or m off those of the job, the file states "
             f"{1e3 * stated.moves.position:.4g} mm and {stated.moves.joint:.4g}"
         )
 
@@ -396,11 +399,11 @@ def _judged_steps(
     program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[CheckedMotion]]:
     """Return the certificates of the motions of a job's steps, by the limits that are `judged`."""
-    found, checked = list[JudgedStep](), list[CheckedMotion]()
+    judged_steps, checked = list[JudgedStep](), list[CheckedMotion]()
     for step, own in zip(job.steps, motions, strict=True):
         planned = step.made
         if isinstance(planned, Move):
-            found.append(_judged_move(step.name, planned, own, judged))
+            judged_steps.append(_judged_move(step.name, planned, own, judged))
         else:
             problem = replace(planned.problem, constraints=judged(planned.problem.constraints))
             if program is not None:
@@ -412,9 +415,9 @@ def _judged_steps(
                 partial(problem.certify, tolerance=tolerance),
                 partial(lines.certify, tolerance=tolerance),
             )
-            found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
+            judged_steps.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
         checked.append(CheckedMotion(f"'{step.name}'", own[0]))
-    return tuple(found), checked
+    return tuple(judged_steps), checked
 
 
 def _elsewhere(
@@ -446,7 +449,7 @@ def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[st
     if len(events) != len(switched):
         yield f"it switches {len(switched)} times, the job {len(events)} times"
         return
-    known: dict[str, Switch] = {}
+    switches: dict[str, Switch] = {}
     for (at, seam, event), switch in zip(events, switched, strict=True):
         if abs(at - switch.at) > _PROMPT:
             yield (
@@ -466,12 +469,12 @@ def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[st
                 )
         elif stated is not None:
             yield f"its head does not say which output event '{event}' switches"
-        before = known.setdefault(event, switch)
+        before = switches.setdefault(event, switch)
         if before[1:] != switch[1:]:
             yield (
                 f"event '{event}' switches '{before.output}' to {before.value} once, and "
                 f"'{switch.output}' to {switch.value} at {switch.at:.4f} s"
             )
-    for (one, first), (other, second) in combinations(known.items(), 2):
+    for (one, first), (other, second) in combinations(switches.items(), 2):
         if first.value is not None and first[1:] == second[1:] and are_opposite(one, other):
             yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"

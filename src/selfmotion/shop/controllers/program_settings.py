@@ -125,8 +125,8 @@ class ProgramSettings:
                 raise ProblemError(
                     f"axes: '{joint}' is axis {shown(axis)}, expected one of A1 to A6, E1 to E6"
                 )
-        given = self.signals or {}
-        signals = {event: _signal(event, value) for event, value in given.items()}
+        signal_table = self.signals or {}
+        signals = {event: _signal(event, value) for event, value in signal_table.items()}
         object.__setattr__(self, "signals", signals)
         if self.flange is not None and not isinstance(self.flange, str):
             raise ProblemError(f"flange is {shown(self.flange)}, expected the name of a link")
@@ -153,8 +153,8 @@ class ProgramSettings:
 
     def _check_targets(self) -> None:
         if self.targets not in TARGETS:
-            known = ", ".join(f"'{name}'" for name in TARGETS)
-            raise ProblemError(f"targets are {shown(self.targets)}, expected one of {known}")
+            choices = ", ".join(f"'{name}'" for name in TARGETS)
+            raise ProblemError(f"targets are {shown(self.targets)}, expected one of {choices}")
         if not (self.work_object is None or isinstance(self.work_object, str)):
             work = as_pose(self.work_object, "work_object", ProblemError)
             far = float(np.abs(work.translation).max())
@@ -220,18 +220,18 @@ def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettin
     except FileFormatError as error:
         text = str(error).removeprefix(f"{path}: ")
         raise FileFormatError(f"{path}: {text}") from error
-    known = [item.name for item in dataclasses.fields(ProgramSettings)]
+    keys = [item.name for item in dataclasses.fields(ProgramSettings)]
     for key in values:
-        if key not in known:
+        if key not in keys:
             raise FileFormatError(
-                f"{path}: unknown key '{key}'{nearest(key, known)}; expected {', '.join(known)}"
+                f"{path}: unknown key '{key}'{nearest(key, keys)}; expected {', '.join(keys)}"
             )
     try:
         for key in {"deviation", "move_deviation"} & set(values):
-            given = values[key]
-            if not isinstance(given, dict) or set(given) - {"position", "rotation"}:
+            value = values[key]
+            if not isinstance(value, dict) or set(value) - {"position", "rotation"}:
                 raise ProblemError(f"{key}: expected a table of position and rotation")
-            values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
+            values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **value})
         if not isinstance(values.get("work_object", ""), str):
             values["work_object"] = pose_of(values["work_object"])
         return ProgramSettings(**{**values, **changes})
@@ -241,18 +241,18 @@ def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettin
         raise FileFormatError(f"{path}: work_object: {error}") from error
 
 
-def _signal(event: object, given: object) -> Signal | None:
+def _signal(event: object, setting: object) -> Signal | None:
     # Files have no None.
-    if given is None or given is False:
+    if setting is None or setting is False:
         return None
-    if isinstance(given, list | tuple) and len(given) == 2:
-        output, value = given
+    if isinstance(setting, list | tuple) and len(setting) == 2:
+        output, value = setting
         named = isinstance(output, str) and output.isascii() and output.isidentifier()
         numbered = isinstance(output, int) and not isinstance(output, bool) and 0 <= output < 8192
         if isinstance(value, bool) and (named or numbered):
             return output, value
     raise ProblemError(
-        f"signals: '{event}' is {shown(given)}, expected an output (its name or number) and "
+        f"signals: '{event}' is {shown(setting)}, expected an output (its name or number) and "
         f"whether it becomes true"
     )
 
@@ -298,10 +298,10 @@ def axes_of(robot: RobotModel, settings: ProgramSettings) -> tuple[Axis, ...]:
             raise ProblemError(f"{robot.name}: axes: joint '{joint}' has no axis; give all joints")
     for joint in names:
         if joint not in robot.joint_names:
-            known = ", ".join(robot.joint_names)
-            raise ProblemError(f"{robot.name}: axes: '{joint}' is none of its joints: {known}")
-    found = [names[joint] for joint in robot.joint_names]
-    twice = next((name for name in found if found.count(name) > 1), None)
+            joints = ", ".join(robot.joint_names)
+            raise ProblemError(f"{robot.name}: axes: '{joint}' is none of its joints: {joints}")
+    axis_names = [names[joint] for joint in robot.joint_names]
+    twice = next((name for name in axis_names if axis_names.count(name) > 1), None)
     if twice is not None:
         raise ProblemError(f"{robot.name}: axes: two joints are axis {twice}; give each its own")
     axes = tuple(
@@ -321,34 +321,34 @@ def _usual(robot: RobotModel) -> dict[str, str]:
     parts: dict[str, list[str]] = {}
     for name in turning:
         parts.setdefault(name.rpartition("/")[0], []).append(name)
-    own = max(parts.values(), key=len, default=[])
-    _check_one_arm(robot, own)
-    others = [name for name in robot.joint_names if name not in own]
-    if len(own) == _ROBOT + 1:
+    arm_joints = max(parts.values(), key=len, default=[])
+    _check_one_arm(robot, arm_joints)
+    others = [name for name in robot.joint_names if name not in arm_joints]
+    if len(arm_joints) == _ROBOT + 1:
         # The arm's own seventh is the first of the others.
-        others = [own[_SEVENTH], *others]
-        own = own[:_SEVENTH] + own[_SEVENTH + 1 :]
-    if len(own) > _ROBOT or len(others) > _ROBOT:
+        others = [arm_joints[_SEVENTH], *others]
+        arm_joints = arm_joints[:_SEVENTH] + arm_joints[_SEVENTH + 1 :]
+    if len(arm_joints) > _ROBOT or len(others) > _ROBOT:
         raise ProblemError(
-            f"{robot.name}: has {len(own)} joints that turn and {len(others)} others, expected at "
-            f"most 6 and 6; say by axes= which joint is which axis (A1 to A6, E1 to E6)"
+            f"{robot.name}: has {len(arm_joints)} joints that turn and {len(others)} others, "
+            f"expected at most 6 and 6; say by axes= which joint is which axis (A1 to A6, E1 to E6)"
         )
-    return {name: f"A{k}" for k, name in enumerate(own, 1)} | {
+    return {name: f"A{k}" for k, name in enumerate(arm_joints, 1)} | {
         name: f"E{k}" for k, name in enumerate(others, 1)
     }
 
 
-def _check_one_arm(robot: RobotModel, own: Sequence[str]) -> None:
+def _check_one_arm(robot: RobotModel, arm_joints: Sequence[str]) -> None:
     """Refuse joints of one URDF of which only some carry the tool: a table is no wrist."""
     carriers = robot.chain_to(robot.tool, None).joints
     carrying = {robot.joint_names[k] for k in carriers.tolist()}
-    beside = [name for name in own if name not in carrying]
-    if beside and len(beside) < len(own):
-        arm = [name for name in own if name in carrying]
+    not_carrying = [name for name in arm_joints if name not in carrying]
+    if not_carrying and len(not_carrying) < len(arm_joints):
+        arm = [name for name in arm_joints if name in carrying]
         axes = {name: f"A{k}" for k, name in enumerate(arm, 1)}
-        axes |= {name: f"E{k}" for k, name in enumerate(beside, 1)}
+        axes |= {name: f"E{k}" for k, name in enumerate(not_carrying, 1)}
         raise ProblemError(
-            f"{robot.name}: joint '{beside[0]}' does not carry the tool '{robot.tool}', as "
+            f"{robot.name}: joint '{not_carrying[0]}' does not carry the tool '{robot.tool}', as "
             f"{', '.join(arm)} do: say by axes= which joint is which axis of the controller, for "
             f"example {axes}"
         )

@@ -145,8 +145,8 @@ class ProgramFrames:
         """
         by_joint = {axis.joint: axis for axis in axes}
         if sorted(by_joint) != sorted(robot.joint_names):
-            known = ", ".join(robot.joint_names)
-            raise FileFormatError(f"{file}: has joints {', '.join(by_joint)}, expected {known}")
+            joints = ", ".join(robot.joint_names)
+            raise FileFormatError(f"{file}: has joints {', '.join(by_joint)}, expected {joints}")
         if not self.carrier or self.work is None or self.tool is None:
             raise FileFormatError(
                 f"{file}: poses need the comment 'poses: work object NAME of LINK, flange LINK', "
@@ -155,23 +155,23 @@ class ProgramFrames:
         settings = ProgramSettings(flange=None if self.flange == "-" else self.flange)
         try:
             flange_to_tool = tool_from_flange(robot, settings)
-            own = tuple(by_joint[name] for name in robot.joint_names)
-            found = ToolFrames(
-                robot, own, self.carrier, self.work, self.work_name, self.tool, flange_to_tool
+            in_order = tuple(by_joint[name] for name in robot.joint_names)
+            frames = ToolFrames(
+                robot, in_order, self.carrier, self.work, self.work_name, self.tool, flange_to_tool
             )
-            why = found.undetermined()
+            why = frames.undetermined()
         except RobotError as error:
             raise FileFormatError(f"{file}: {error}") from error
         if why:
             raise FileFormatError(f"{file}: has poses, but {why}")
-        if self.is_carried not in (None, found.is_carried):
+        if self.is_carried not in (None, frames.is_carried):
             stands, carried = "stands in the world", "is carried by an axis"
             says, expected = (carried, stands) if self.is_carried else (stands, carried)
             raise FileFormatError(
                 f"{file}: its work object {says}, expected one that {expected}: its comments "
                 f"say that it is of '{self.carrier}'"
             )
-        return found
+        return frames
 
 
 # Rounding of poses to the digits of files [m, elements of a rotation].
@@ -221,8 +221,8 @@ class SegmentBuilder:
             t = times_of(row.seconds)
             if not row.axes and self.at is None:
                 raise FileFormatError(f"{self.file}: rests before it has a target")
-            given = np.array(row.axes, dtype=np.float64)
-            q = self.in_si(given) if row.axes else np.array([self.at] * len(t))
+            values = np.array(row.axes, dtype=np.float64)
+            q = self.in_si(values) if row.axes else np.array([self.at] * len(t))
             segment = Segment(row.name, t, q)
         self.segments.append(segment)
         self.at = segment.q[-1]
@@ -251,8 +251,8 @@ class SegmentBuilder:
         seconds = max(far / _SLOW_SPEED, angle / _SLOW_SPEED, _SHORTEST)
         moves = bool(self.segments) and max(far, angle) > _SAME_PLACE
         here = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
-        found = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
-        segment = replace(found, is_slow=True)
+        slow = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
+        segment = replace(slow, is_slow=True)
         if not self.segments:
             self.start_gap = float(np.abs(segment.q[-1] - before).max())
         if moves:
@@ -316,7 +316,7 @@ class SegmentBuilder:
 
         A block of poses is solved at once; where that is not continuous, one pose after another.
         """
-        found = np.empty((len(rows), len(first)))
+        joints = np.empty((len(rows), len(first)))
         at = np.array(first)
         for k in range(0, len(rows), _SAMPLES):
             block = rows[k : k + _SAMPLES]
@@ -328,9 +328,9 @@ class SegmentBuilder:
                 or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _LARGE_STEP
             ):
                 q = self._sequential(frames, block, at, row, (k, count))
-            found[k : k + _SAMPLES] = q
+            joints[k : k + _SAMPLES] = q
             at = q[-1]
-        return found
+        return joints
 
     def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
         seeds = np.repeat(at[None], len(poses), axis=0)
@@ -340,7 +340,7 @@ class SegmentBuilder:
     def _sequential(
         self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]
     ) -> Array:
-        found, (first, count) = np.empty((len(poses), len(at))), position
+        joints, (first, count) = np.empty((len(poses), len(at))), position
         for k, pose in enumerate(poses, first):
             q, arrived = self._solved(frames, pose[None], at)
             far = np.abs(q[0] - at)[frames.arm].max()
@@ -350,8 +350,8 @@ class SegmentBuilder:
                     f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
                     f"reach, or singular on the way"
                 )
-            found[k - first] = at = q[0]
-        return found
+            joints[k - first] = at = q[0]
+        return joints
 
     def _frames_and_order(self) -> tuple[ToolFrames, list[int]]:
         """Return the tool frames, and the index of the robot's joint for each axis of the file."""

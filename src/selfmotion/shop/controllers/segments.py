@@ -103,9 +103,9 @@ def by_interpolation(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
 
     Where a part has fewer of them, its last one stands for the others.
     """
-    each = [list(own) for own in parts]
-    count = max(len(own) for own in each)
-    return [[own[min(k, len(own) - 1)] for own in each] for k in range(count)]
+    each = [list(part) for part in parts]
+    count = max(len(part) for part in each)
+    return [[part[min(k, len(part) - 1)] for part in each] for k in range(count)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +166,8 @@ class Segment:
         """Return rows at times on the cubic spline through all, from rest to rest."""
         from scipy.interpolate import CubicSpline
 
-        found: Array = CubicSpline(self.t, self.rows, bc_type="clamped")(times)
-        return found
+        values: Array = CubicSpline(self.t, self.rows, bc_type="clamped")(times)
+        return values
 
     def joints(self, rows: Array, times: Array) -> Array:
         """Return the joint positions (K, n) of rows at times; NaN where none are known."""
@@ -177,8 +177,8 @@ class Segment:
     def curves(self) -> list[Curve]:
         """Interpolations of a controller: polygon, polygon with blended corners, cubic spline."""
         lines = polygons(self.t, self.rows, self.between)
-        found: list[Curve] = [partial(self.between, t=t, rows=rows) for t, rows in lines]
-        return found if len(self.t) < 3 else [*found, self.spline]
+        curves: list[Curve] = [partial(self.between, t=t, rows=rows) for t, rows in lines]
+        return curves if len(self.t) < 3 else [*curves, self.spline]
 
     def evaluation_times(self) -> Array:
         """Return times at targets and between them (K,) [s]."""
@@ -362,8 +362,8 @@ class PoseSegment(Segment):
     @override
     def rows(self) -> Array:
         """Positions, quaternions and external axes, (K + 1, 7 + m)."""
-        own = self.q[:, np.argsort(self.order)]
-        return np.hstack([self.positions, self.quaternions, own[:, self.frames.external]])
+        by_robot = self.q[:, np.argsort(self.order)]
+        return np.hstack([self.positions, self.quaternions, by_robot[:, self.frames.external]])
 
     @override
     def between(self, times: Array, t: Array, rows: Array) -> Array:
@@ -379,15 +379,15 @@ class PoseSegment(Segment):
     def joints(self, rows: Array, times: Array) -> Array:
         q = np.array(self.near(times))
         q[:, self.frames.external] = rows[:, 7:]
-        found, arrived = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], q)
-        return np.where(arrived[:, None], found, np.nan)[:, self.order]
+        joints, arrived = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], q)
+        return np.where(arrived[:, None], joints, np.nan)[:, self.order]
 
 
 def straight(times: Array, t: Array, rows: Array) -> Array:
     """Return rows (K, 7 + m) at times: positions linear, orientations by slerp."""
     k = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     share = ((times - t[k]) / (t[k + 1] - t[k]))[:, None]
-    found: Array = (1.0 - share) * rows[k] + share * rows[k + 1]
+    values: Array = (1.0 - share) * rows[k] + share * rows[k + 1]
     first, last = rows[k, 3:7], rows[k + 1, 3:7]
     # Below 90°, as consecutive quaternions have the nearer sign.
     apart, together = (
@@ -398,9 +398,9 @@ def straight(times: Array, t: Array, rows: Array) -> Array:
     near = sine < _SMALL_SINE
     sine = np.where(near, 1.0, sine)
     one, other = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
-    turned = np.where(near, found[:, 3:7], one * first + other * last)
-    found[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-    return found
+    turned = np.where(near, values[:, 3:7], one * first + other * last)
+    values[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return values
 
 
 def fastest_between(t: Array, positions: Array, quaternions: Array) -> tuple[float, float]:
@@ -423,8 +423,8 @@ def fastest_between(t: Array, positions: Array, quaternions: Array) -> tuple[flo
 
 def aligned_quaternions(quaternions: Array) -> Array:
     """Return quaternions (K, 4), each with the sign that is nearer to the previous one."""
-    found = np.array(quaternions)
-    for k in range(1, len(found)):
-        if found[k] @ found[k - 1] < 0.0:
-            found[k] *= -1.0
-    return found
+    aligned = np.array(quaternions)
+    for k in range(1, len(aligned)):
+        if aligned[k] @ aligned[k - 1] < 0.0:
+            aligned[k] *= -1.0
+    return aligned

@@ -73,14 +73,14 @@ def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
         case Move():
             return [_move_operation("move", plan)]
         case Parts():
-            found = []
+            operations = []
             for number, part in enumerate(plan.plans, 1):
-                found.append(_plan_operation(f"part {number}", part))
-                found += [
+                operations.append(_plan_operation(f"part {number}", part))
+                operations += [
                     _move_operation(f"move {number}", m) for m in plan.moves[number - 1 : number]
                 ]
-            return found
-    found = []
+            return operations
+    operations = []
     for step in plan.steps:
         planned = step.made
         operation = (
@@ -88,10 +88,12 @@ def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
             if isinstance(planned, Plan)
             else _move_operation(step.name, planned)
         )
-        found.append(operation._replace(events=tuple((at, name) for name, at in step.happenings)))
-    if not found:
+        operations.append(
+            operation._replace(events=tuple((at, name) for name, at in step.happenings))
+        )
+    if not operations:
         raise PlanError(f"{plan.robot.name}: {plan.verdict}")
-    return found
+    return operations
 
 
 def _plan_operation(name: str, plan: Plan) -> Operation:
@@ -300,7 +302,7 @@ class Section:
 
     def spread_targets(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
         """Return times between fixed ones, with a density by the root of the acceleration."""
-        found, motion = [fixed[:1]], self.operation.motion
+        times, motion = [fixed[:1]], self.operation.motion
         for begin, end in pairwise(fixed):
             inside = motion.t[(motion.t > begin) & (motion.t < end)]
             marks = np.concatenate([[begin], inside, [end]])
@@ -315,20 +317,20 @@ class Section:
             targets = max(self.fewest, int(np.ceil(more * total[-1])))
             # Times have few digits in programs: targets may not coincide.
             targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
-            found.append(np.interp(np.linspace(0.0, total[-1], targets + 1)[1:], total, t))
-            found[-1][-1] = end
-        return np.concatenate(found)
+            times.append(np.interp(np.linspace(0.0, total[-1], targets + 1)[1:], total, t))
+            times[-1][-1] = end
+        return np.concatenate(times)
 
     def scaled_acceleration(self, t: Array, allowed: Tolerance) -> Array:
         """Return accelerations of tool and joints divided by their tolerances, (K,) [1/s²]."""
         motion = self.operation.motion
         q, qdd = motion(t), motion(t, 2)
-        found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
+        scaled: Array = np.abs(qdd).max(axis=1) / allowed.rotation
         for chain in self.operation.chains:
             rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
             for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
-                found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
-        return found
+                scaled = np.maximum(scaled, np.linalg.norm(rates[:, rows], axis=1) / limit)
+        return scaled
 
     def _segment_through(self, t: Array, *, at_rest: bool = False) -> Segment:
         """Return the segment of targets at times, rounded to the digits of the file."""
@@ -412,11 +414,11 @@ def _tolerance_text(operation: Operation, allowed: Tolerance) -> str:
 
 def _distinct_times(first: float, last: float, times: Sequence[float]) -> Array:
     """Return first, last and the times between them that are distinct after rounding."""
-    least, found = 2.0 * 10.0**-TIME_DIGITS, [first]
+    least, distinct = 2.0 * 10.0**-TIME_DIGITS, [first]
     for t in sorted(times):
-        if found[-1] + least < t < last - least:
-            found.append(t)
-    return np.array([*found, last])
+        if distinct[-1] + least < t < last - least:
+            distinct.append(t)
+    return np.array([*distinct, last])
 
 
 def is_at_rest(motion: Trajectory, first: float, last: float) -> bool:

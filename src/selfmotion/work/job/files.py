@@ -116,9 +116,9 @@ class ResultCache:
     """
 
     def __init__(
-        self, folder: Path | None, tolerance: Tolerance, known: MutableMapping[str, Any]
+        self, folder: Path | None, tolerance: Tolerance, arms: MutableMapping[str, Any]
     ) -> None:
-        self._folder, self._tolerance, self._known = folder, tolerance, known
+        self._folder, self._tolerance, self._arms = folder, tolerance, arms
         if folder is not None:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -144,7 +144,7 @@ class ResultCache:
 
     def files(self, robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, str]:
         """Return the digests of the files of an arm's bodies and of its obstacles."""
-        return files_of(robot, constraints, self._known)
+        return files_of(robot, constraints, self._arms)
 
     def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
         """Return the stored plans of a problem, and why there are none.
@@ -156,17 +156,17 @@ class ResultCache:
             return None
         try:
             files = _stored_archives(stored, file)
-            found, reason = [self._plan(name) for name in files], str(stored["reason"])
+            plans, reason = [self._plan(name) for name in files], str(stored["reason"])
             # Each has its own start.
-            problems = [replace(plan.problem, start=problem.start) for plan in found]
+            problems = [replace(plan.problem, start=problem.start) for plan in plans]
         except (SelfmotionError, KeyError, TypeError, ValueError):
             return None
-        same = all(own.digest == problem.digest for own in problems)
-        sound = same and all(plan.certificate.verified for plan in found)
-        return (found, reason) if sound else None
+        same = all(stored_problem.digest == problem.digest for stored_problem in problems)
+        sound = same and all(plan.certificate.verified for plan in plans)
+        return (plans, reason) if sound else None
 
     def _plan(self, file: Path) -> Plan:
-        plan = load_plan(file, known=self._known)
+        plan = load_plan(file, known=self._arms)
         if plan.tolerance == self._tolerance:
             return plan
         return replace(plan, certificate=plan.check(self._tolerance))
@@ -192,10 +192,10 @@ class ResultCache:
             if stored["trouble"]:
                 return replace(missing, reason=str(stored["trouble"]))
             (archive,) = _stored_archives(stored, file)
-            found = load_move(archive, known=self._known)
+            move = load_move(archive, known=self._arms)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
-        return found if satisfies(found, missing, ends) else None
+        return move if satisfies(move, missing, ends) else None
 
     def store_move(self, file: Path | None, move: Move) -> None:
         """Store a move, or why there is none."""
@@ -207,13 +207,13 @@ class ResultCache:
         _write(file, count, {"trouble": "" if count else move.trouble})
 
 
-def satisfies(found: Move, missing: Move, ends: Array) -> bool:
+def satisfies(move: Move, missing: Move, ends: Array) -> bool:
     """Whether a move is verified for the arm, constraints and ends (2, n) of a `missing` one."""
-    if found.trajectory is None or any(another_tool(found.robot, missing.robot)):
+    if move.trajectory is None or any(another_tool(move.robot, missing.robot)):
         return False
-    if float(np.abs(found.motion.q[[0, -1]] - ends).max()) > _JOINED:
+    if float(np.abs(move.motion.q[[0, -1]] - ends).max()) > _JOINED:
         return False
-    return found.verified and not any(not_judged_by(found.constraints, missing.constraints))
+    return move.verified and not any(not_judged_by(move.constraints, missing.constraints))
 
 
 def _archives(file: Path, count: int) -> list[Path]:
@@ -285,20 +285,20 @@ class EarlierProgram:
         It is certified anew for its `problem`, in its direction, since files of bodies may have
         changed. `constraints` and `clearances` are those of the job.
         """
-        known = self.plan_of(seam)
+        earlier_plan = self.plan_of(seam)
         if seam.name not in self._of_seams:
             return None, "the earlier program does not make it"
-        if known is None:
+        if earlier_plan is None:
             return None, "it was made from its end to its start, and may not be any more"
         changed = self._changed(seam, problem.robot, constraints, clearances)
         if changed:
             return None, changed
-        plan, _ = known
-        found = replace(plan, problem=replace(problem, start=plan.problem.start))
-        found = replace(found, certificate=found.check())
-        if found.certificate.verified:
-            return found, ""
-        return None, f"it is not verified any more: {found.certificate.summary}"
+        plan, _ = earlier_plan
+        again = replace(plan, problem=replace(problem, start=plan.problem.start))
+        again = replace(again, certificate=again.check())
+        if again.certificate.verified:
+            return again, ""
+        return None, f"it is not verified any more: {again.certificate.summary}"
 
     def _changed(
         self,
@@ -311,19 +311,19 @@ class EarlierProgram:
         before = self.program.specification
         if before is None:
             return "the earlier program does not say what was asked for"
-        own = next((item for item in before.seams if item.name == seam.name), None)
-        if own is None:
+        seam_before = next((item for item in before.seams if item.name == seam.name), None)
+        if seam_before is None:
             return "the earlier program does not say what was asked of it"
         if before.arm != arm_digest(robot):
             return "the arm is another, or its tool, reference, limits or locked joints are"
-        if Task.of(own.task) is not Task.of(seam.task):
+        if Task.of(seam_before.task) is not Task.of(seam.task):
             return "its task is another"
-        if not _cost_the_same(own.costs, seam.costs):
+        if not _cost_the_same(seam_before.costs, seam.costs):
             return "its costs are others"
         pairs: dict[str, tuple[Sequence[Any], Sequence[Any]]] = {
-            "its path is another": ([own.path], [seam.path]),
-            "its tolerances are others": (own.relaxations, seam.relaxations),
-            "its constraints are others": (own.constraints, seam.constraints),
+            "its path is another": ([seam_before.path], [seam.path]),
+            "its tolerances are others": (seam_before.relaxations, seam.relaxations),
+            "its constraints are others": (seam_before.constraints, seam.constraints),
             "the constraints of the job are others": (before.constraints, constraints),
             "what the job is kept clear of is another": (before.clearances, clearances),
         }
@@ -338,17 +338,17 @@ class EarlierProgram:
         `changed` has seams whose specification changed; `why` says what was wrong with a program
         of all unchanged motions.
         """
-        found = dict[str, str]()
+        kept = dict[str, str]()
         for name, plan in program.plans.items():
-            known, _ = self._of_seams.get(name, (None, False))
-            motion = None if known is None else known.trajectory
+            plan_before, _ = self._of_seams.get(name, (None, False))
+            motion = None if plan_before is None else plan_before.trajectory
             same = motion is not None and all(
                 np.array_equal(getattr(motion, part), getattr(plan.trajectory, part))
                 for part in ("t", "q", "qd")
             )
             reason = changed.get(name) or f"no program comes of what could be kept: {why}"
-            found[name] = "" if same else reason
-        return found
+            kept[name] = "" if same else reason
+        return kept
 
     def order_of(self, seams: Sequence[Seam]) -> list[Seam] | None:
         """Return the seams in its order, if it has the same seams and this order is allowed."""
@@ -360,10 +360,10 @@ class EarlierProgram:
 
     def move_like(self, ends: Array) -> Move | None:
         """Return the move whose ends are nearest to others (2, n), or None for none near."""
-        found = [move for move in self.program.moves if _moves_the_arm(move)]
-        far = [_distance(move.motion.q[[0, -1]], ends) for move in found]
+        moves = [move for move in self.program.moves if _moves_the_arm(move)]
+        far = [_distance(move.motion.q[[0, -1]], ends) for move in moves]
         k = int(np.argmin(far)) if far else -1
-        return found[k] if k >= 0 and far[k] < _NEAR else None
+        return moves[k] if k >= 0 and far[k] < _NEAR else None
 
 
 def _described(several: Sequence[Any]) -> str:

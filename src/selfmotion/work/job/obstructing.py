@@ -56,13 +56,13 @@ class CollisionChecks:
         while new := {n: item for n, item in avoided.items() if n not in clear and n not in met}:
             clearance = settings.clearance_from(tuple(new.values()))
             motion = FinishedMotion(settings.robot, plan.trajectory)
-            found = clearance.requirement(settings.robot).judge(motion)
-            if found.satisfied:
+            collisions = clearance.requirement(settings.robot).judge(motion)
+            if collisions.satisfied:
                 clear |= set(new)
                 break
-            why = why or found.text
+            why = why or collisions.text
             # An obstacle without a name may be any of them.
-            met |= {name for name in found.subject.split(" - ") if name in new} or set(new)
+            met |= {name for name in collisions.subject.split(" - ") if name in new} or set(new)
         return met, why
 
 
@@ -221,26 +221,26 @@ class ObstructingBuilder:
         self._failed_moves[seam] = self._failed_moves.get(seam, 0) + 1
         if self._failed_moves[seam] < _MAX_FAILED_MOVES:
             return
-        found = {key[:2] for key, move in self._moves.items() if move.verified}
+        verified = {key[:2] for key, move in self._moves.items() if move.verified}
         states = range(len(self._ordering.states))
         for last in [k for k in states if self._ordering.states[k].seam == seam]:
             for first in (None, *states):
-                if (first, last) not in found:
+                if (first, last) not in verified:
                     self._ordering.record_time(first, last, np.inf)
 
     def _move_keys(self, states: Sequence[int]) -> dict[_MoveKey, Obstacles]:
         """Return the moves of an order, and the obstacles that each has to avoid."""
-        found = dict[_MoveKey, Obstacles]()
+        keys = dict[_MoveKey, Obstacles]()
         left_behind, before = Obstacles(), None
         for state in (*states, None):
             ends = [None if k is None else self._seam(k) for k in (before, state)]
             avoided = except_touched(left_behind, *ends)
             if self._goes_between(before, state):
-                found[before, state, frozenset(avoided)] = avoided
+                keys[before, state, frozenset(avoided)] = avoided
             if state is not None:
                 left_behind |= {item.name: item for item in self._seam(state).leaves}
             before = state
-        return found
+        return keys
 
     def _goes_between(self, first: int | None, last: int | None) -> bool:
         """Whether there is a move: ends of the program that are not given have none."""
@@ -271,18 +271,18 @@ class ObstructingBuilder:
             if tries > _MAX_TRIES or seam not in ordering.planned:
                 continue
             if self._add_alternatives(seam, q, avoided):
-                found = ordering.best(states).states
-                if found:
-                    return found
+                best_round = ordering.best(states).states
+                if best_round:
+                    return best_round
         while reasons := self._reasons_to_drop():
             # The one without which most of the others remain; as a rule one that failed.
             seam = max(reasons, key=ordering.count_without)
             ordering.drop(seam, reasons[seam])
             left = set(ordering.planned)
             near = [state for state in states if ordering.states[state].seam in left]
-            found = ordering.best(near).states
-            if found:
-                return found
+            best_round = ordering.best(near).states
+            if best_round:
+                return best_round
         return ()
 
     def _reasons_to_drop(self) -> dict[int, str]:
@@ -311,15 +311,15 @@ class ObstructingBuilder:
         return True
 
     def _add_new(
-        self, number: int, found: Sequence[tuple[bool, Sequence[Plan]]], avoided: Obstacles
+        self, number: int, results: Sequence[tuple[bool, Sequence[Plan]]], avoided: Obstacles
     ) -> bool:
         """Add those plans of a seam that are new and avoid the obstacles."""
         ordering, count = self._ordering, len(self._ordering.states)
-        known = [one.plan.trajectory.q for one in ordering.states if one.seam == number]
-        for turned, plans in found:
+        configurations = [one.plan.trajectory.q for one in ordering.states if one.seam == number]
+        for turned, plans in results:
             for plan in plans:
                 ends = plan.trajectory.q[[0, -1]]
-                is_known = any(np.abs(q[[0, -1]] - ends).max() < _SAME for q in known)
+                is_known = any(np.abs(q[[0, -1]] - ends).max() < _SAME for q in configurations)
                 if not is_known and not self._collisions.collisions(plan, avoided)[0]:
                     ordering.add(number, plan, turned)
         return len(ordering.states) > count

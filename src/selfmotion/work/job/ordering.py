@@ -124,8 +124,8 @@ class Ordering:
                 else (seam, settings.problem(seam, turned=one[1]), one[0])
             )
         self._unchanged = tuple(self.states)
-        found = work.like_before(list(wanted.values())) if wanted else []
-        for number, (plans, reason) in zip(wanted, found, strict=True):
+        previous = work.like_before(list(wanted.values())) if wanted else []
+        for number, (plans, reason) in zip(wanted, previous, strict=True):
             one = earlier[number]
             if not plans:
                 self.missing[self.seams[number].name] = reason
@@ -196,10 +196,10 @@ class Ordering:
 
     def count_without(self, seam: int) -> int:
         """Return how many seams remain in an order without this one; 0 for no order."""
-        known = dict(self.missing)
+        missing = dict(self.missing)
         self.drop(seam, "")
         count = len(self.planned) if self.best().states else 0
-        self.missing = known
+        self.missing = missing
         return count
 
     def _drop_dependents(self) -> None:
@@ -266,10 +266,10 @@ class Ordering:
         if not place:
             return Round((), 0.0, 0.0)
         stops = self._stops(present, place)
-        given = None if self.is_free else list(range(len(place)))
+        fixed_order = None if self.is_free else list(range(len(place)))
         order = None if near is None else [place[self.states[k].seam] for k in near]
-        found = best_round(stops, given, order)
-        return Round(tuple(present[k] for k in found.states), found.cost, found.bound)
+        best = best_round(stops, fixed_order, order)
+        return Round(tuple(present[k] for k in best.states), best.cost, best.bound)
 
     def bound(self) -> float:
         """Return a lower bound of the cost of any round, by lower bounds of all moves."""
@@ -328,9 +328,11 @@ class Ordering:
         new = [seam for seam in self.planned if seam not in self._with_earlier]
         plans = self._work.nearby([(self.seams[k], self.problems[k], here) for k in new])
         for seam, found in zip(new, plans, strict=True):
-            known = [state for state in self.states if state.seam == seam]
+            states_of_seam = [state for state in self.states if state.seam == seam]
             for plan in found:
-                starts = [self.seconds(plan.trajectory.q[0], state.ends[0]) for state in known]
+                starts = [
+                    self.seconds(plan.trajectory.q[0], state.ends[0]) for state in states_of_seam
+                ]
                 if min(starts) > _WORTH:
                     self.add(seam, plan)
 

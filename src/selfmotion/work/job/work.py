@@ -92,16 +92,16 @@ class JobSettings:
             # Made once for a seam and the move to it, since collision models take time.
             if len(self._clearances) >= _CACHED_CLEARANCES:
                 self._clearances.clear()
-            known = self.clearances[0] if self.clearances else Clearance(distance=0.0)
-            obstacles = (*known.obstacles, *obstacles)
-            self._clearances[key] = replace(known, obstacles=obstacles, srdf=None)
+            clearance = self.clearances[0] if self.clearances else Clearance(distance=0.0)
+            obstacles = (*clearance.obstacles, *obstacles)
+            self._clearances[key] = replace(clearance, obstacles=obstacles, srdf=None)
         return self._clearances[key]
 
     def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
         """Return the problem of a seam, with further obstacles."""
         every = (*self.constraints, *seam.constraints)
         constraints, clearances = separate_clearances(every, self.clearances_with(obstacles))
-        given = Problem(
+        problem = Problem(
             self.robot,
             seam.path,
             seam.task,
@@ -110,8 +110,8 @@ class JobSettings:
             clearance=clearances,
         )
         if seam.costs is not None:
-            given = replace(given, costs=tuple(seam.costs))
-        return backwards(given) if turned else given
+            problem = replace(problem, costs=tuple(seam.costs))
+        return backwards(problem) if turned else problem
 
     def move_constraints(self, obstacles: Sequence[Any]) -> tuple[Constraint, ...]:
         """Return the constraints of moves, with further obstacles."""
@@ -149,8 +149,8 @@ class Work:
         """Return the earlier plan of a seam that has not changed, or why there is none."""
         if self.earlier is None:
             return None, ""
-        settings, known = self.settings, self.earlier.plan_of(seam)
-        problem = settings.problem(seam, turned=known is not None and known[1])
+        settings, earlier_plan = self.settings, self.earlier.plan_of(seam)
+        problem = settings.problem(seam, turned=earlier_plan is not None and earlier_plan[1])
         constraints, clearances = settings.constraints, settings.clearances
         return self.earlier.unchanged_plan(seam, problem, constraints, clearances)
 
@@ -196,7 +196,7 @@ class Work:
             {"problem": problem, "name": seam.name, "near": q.tolist()}
             for seam, problem, q in wanted
         ]
-        return [found for found, _ in self._plans(tasks, "nearby")]
+        return [plan for plan, _ in self._plans(tasks, "nearby")]
 
     def moves(
         self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]], names: Sequence[str]
@@ -259,8 +259,10 @@ class Work:
         store: Callable[[Path | None, _Result], None],
     ) -> list[_Result]:
         """Return the results of tasks: stored ones, and new ones, stored when finished."""
-        found = {k: known for k, known in enumerate(stored) if known is not None}
-        todo = {k: task for k, task in enumerate(tasks) if k not in found}
+        results = {
+            k: stored_result for k, stored_result in enumerate(stored) if stored_result is not None
+        }
+        todo = {k: task for k, task in enumerate(tasks) if k not in results}
         with closing(self._computed(todo, kind)) as new:
             # In other processes all begin at once, so that none is under way alone.
             here = [] if self._executor is not None else list(todo)
@@ -272,8 +274,8 @@ class Work:
                 if number > len(tasks) - len(todo):
                     k, result = next(new)
                     store(files[k], result)
-                    found[k] = result
-        return [found[k] for k in range(len(tasks))]
+                    results[k] = result
+        return [results[k] for k in range(len(tasks))]
 
     def _computed(self, tasks: Mapping[int, _Task], kind: str) -> Generator[_Finished, None, None]:
         """Yield task and result as each is finished; other processes begin all at once."""
@@ -281,17 +283,17 @@ class Work:
             for k, task in tasks.items():
                 yield k, _compute_move(task) if kind == "move" else _compute_plans(task)
             return
-        known: dict[str, Any] = {}
+        arms: dict[str, Any] = {}
         sent = {self._submitted(task, kind): k for k, task in tasks.items()}
         try:
             for future in as_completed(sent):
-                found, why = future.result()
+                result, why = future.result()
                 k = sent[future]
                 if kind == "move":
                     missing = _missing(tasks[k], why)
-                    yield k, _unpacked(found, load_move, known) if found else missing
+                    yield k, _unpacked(result, load_move, arms) if result else missing
                 else:
-                    yield k, ([_unpacked(data, load_plan, known) for data in found], why)
+                    yield k, ([_unpacked(data, load_plan, arms) for data in result], why)
         finally:
             # After an interruption the others are not waited for.
             for future in sent:
@@ -382,18 +384,18 @@ _arms = ArmCache()
 
 def _plans_for_parent(task: _Task) -> tuple[list[bytes], str]:
     """Return the plans of a task, in another process, as the bytes of their files."""
-    known = _arms.of(task["files"])
+    arms = _arms.of(task["files"])
     problems = [name for name in ("problem", "allowed") if name in task]
-    values: dict[str, Any] = {name: problem_from_dict(task[name], known) for name in problems}
+    values: dict[str, Any] = {name: problem_from_dict(task[name], arms) for name in problems}
     if "like" in task:
-        values["like"] = _unpacked(task["like"], load_plan, known)
-    found, reason = _compute_plans({**task, **values})
-    return [_packed(plan) for plan in found], reason
+        values["like"] = _unpacked(task["like"], load_plan, arms)
+    plans, reason = _compute_plans({**task, **values})
+    return [_packed(plan) for plan in plans], reason
 
 
 def _move_for_parent(task: _Task) -> tuple[bytes, str]:
-    known = _arms.of(task["files"])
-    arm, ends = arm_and_constraints(task["arm"], known), np.array(task["ends"])
+    arms = _arms.of(task["files"])
+    arm, ends = arm_and_constraints(task["arm"], arms), np.array(task["ends"])
     move = _compute_move({**task, "arm": arm, "ends": ends})
     return (b"" if move.trajectory is None else _packed(move)), move.trouble
 
@@ -405,11 +407,11 @@ def _packed(result: Plan | Move) -> bytes:
         return file.read_bytes()
 
 
-def _unpacked(data: bytes, load: Any, known: dict[str, Any]) -> Any:
+def _unpacked(data: bytes, load: Any, arms: dict[str, Any]) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "result.npz")
         file.write_bytes(data)
-        return load(file, known=known)
+        return load(file, known=arms)
 
 
 # The steps of a program for a seam.

@@ -11,8 +11,8 @@ from selfmotion.basics import Array, ProblemError, as_number, as_numbers, shown
 from selfmotion.certificate import Tolerance
 from selfmotion.model.collision import CollisionModel, DisplacedBodies
 from selfmotion.planning.result import Plan
-from selfmotion.work.margins.found import Displacement, Margins, SubjectMargin
 from selfmotion.work.margins.least import Least, Size, least_scale
+from selfmotion.work.margins.results import Displacement, Margins, SubjectMargin
 from selfmotion.work.margins.subjects import (
     Subject,
     base_of,

@@ -6,10 +6,10 @@ from selfmotion.work.placement.corners import (
     CorrectionSide as CorrectionSide,
     correction as correction,
 )
-from selfmotion.work.placement.found import PlaceMap as PlaceMap, Placement as Placement
 from selfmotion.work.placement.page import write_placement as write_placement
 from selfmotion.work.placement.place import place as place
 from selfmotion.work.placement.places import Tried as Tried
+from selfmotion.work.placement.results import PlaceMap as PlaceMap, Placement as Placement
 from selfmotion.work.placement.with_margin import (
     PlanWithMargin as PlanWithMargin,
     plan_with_margin as plan_with_margin,

@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 
 from selfmotion.basics import ProblemError, as_path, shown, write_text
-from selfmotion.work.placement.found import PlaceMap, Placement
 from selfmotion.work.placement.picture import in_unit, legend_of
+from selfmotion.work.placement.results import PlaceMap, Placement
 
 # Characters of a reason on the page, and how many of them.
 _LONGEST, _MOST_REASONS = 120, 8

@@ -12,7 +12,7 @@ import numpy as np
 from selfmotion.basics import Array
 
 if TYPE_CHECKING:
-    from selfmotion.work.placement.found import PlaceMap
+    from selfmotion.work.placement.results import PlaceMap
 
 # Sizes in the picture, which is as wide as its page: on a phone letters are two thirds as large.
 _WIDE, _LEFT, _RIGHT, _TOP, _BOTTOM = 560.0, 52.0, 14.0, 12.0, 46.0

@@ -29,7 +29,6 @@ from selfmotion.basics import (
 from selfmotion.planning.planner import Deadline, PlanRequest
 from selfmotion.problem.problem import Problem
 from selfmotion.work.batch import Item
-from selfmotion.work.placement.found import Placement, flat_along, on_bounds
 from selfmotion.work.placement.places import (
     COORDINATES,
     Places,
@@ -38,6 +37,7 @@ from selfmotion.work.placement.places import (
     places_of,
     restored,
 )
+from selfmotion.work.placement.results import Placement, flat_along, on_bounds
 from selfmotion.work.placement.search import Box, Descent, best_place
 
 # Places that this process was sent before, by their description.
@@ -117,13 +117,13 @@ def place(
     run = _Here(places, box, told) if executor is None else _There(places, box, executor, told)
     # The present place is planned thoroughly: its cost is reported.
     here = np.zeros(len(names))
-    known = [places.tried(here, thorough=True)] if box.holds(here) else []
+    begun = [places.tried(here, thorough=True)] if box.holds(here) else []
     try:
-        best, tried = best_place(places, box, run.every, run.near, run.descents, known)
+        best, tried = best_place(places, box, run.every, run.near, run.descents, begun)
     except KeyboardInterrupt:
         if not clock.passed:
             raise
-        tried = [*known, *run.tried]
+        tried = [*begun, *run.tried]
         best = _best_so_far(tried, deadline)
     if not np.isfinite(best.cost):
         raise PlanError(
@@ -164,10 +164,10 @@ def _planned(places: Places, best: Tried) -> Tried:
     """Return a place with its plans, which may have been made elsewhere."""
     if best.plans:
         return best
-    found = places.tried(best.place, thorough=True)
-    if not np.isfinite(found.cost):
-        raise PlanError(f"place: the best place is not verified here: {found.reason}")
-    return found
+    best_tried = places.tried(best.place, thorough=True)
+    if not np.isfinite(best_tried.cost):
+        raise PlanError(f"place: the best place is not verified here: {best_tried.reason}")
+    return best_tried
 
 
 def _box(within: Any) -> tuple[tuple[str, ...], Box]:
@@ -209,33 +209,33 @@ class _Here:
         self._places, self._box, self._progress = places, box, progress
         self.tried = list[Tried]()
 
-    def _tell(self, found: Tried) -> None:
-        self.tried.append(found)
+    def _tell(self, place: Tried) -> None:
+        self.tried.append(place)
         self._progress("places", len(self.tried), 0)
 
     def every(self, wanted: Sequence[Array]) -> list[Tried]:
         """Plan at places, each on its own."""
-        found = []
+        tried = []
         for each in wanted:
-            found.append(self._places.tried(each))
-            self._tell(found[-1])
-        return found
+            tried.append(self._places.tried(each))
+            self._tell(tried[-1])
+        return tried
 
     def near(self, wanted: Sequence[tuple[Array, Tried]]) -> list[Tried]:
         """Plan at places, each from the motions of another one."""
-        found = []
+        tried = []
         for each, other in wanted:
-            found.append(self._places.tried(each, other.plans))
-            self._tell(found[-1])
-        return found
+            tried.append(self._places.tried(each, other.plans))
+            self._tell(tried[-1])
+        return tried
 
     def descents(self, begun: Sequence[Tried]) -> list[tuple[Tried, list[Tried]]]:
         """Go downhill from places."""
-        found = []
+        tried = []
         for each in begun:
             descent = Descent(self._places, self._box, self._tell)
-            found.append((descent.run(each), descent.tried))
-        return found
+            tried.append((descent.run(each), descent.tried))
+        return tried
 
 
 class _There:
@@ -249,10 +249,10 @@ class _There:
         self._progress = progress
         self.tried = list[Tried]()
 
-    def _known(self, found: list[Tried]) -> list[Tried]:
-        self.tried += found
+    def _known(self, tried: list[Tried]) -> list[Tried]:
+        self.tried += tried
         self._progress("places", len(self.tried), 0)
-        return found
+        return tried
 
     def every(self, wanted: Sequence[Array]) -> list[Tried]:
         """Plan at places, each on its own."""
@@ -300,8 +300,8 @@ def _try_near(sent: str, modules: Sequence[str], at: Array, other: Array) -> Tri
     """Plan at a place in another process, from the motions of another place."""
     places = _received(sent, modules)
     near = places.tried(other)
-    found = places.tried(at, near.plans) if near.plans else near
-    return replace(found, place=at, plans=())
+    tried = places.tried(at, near.plans) if near.plans else near
+    return replace(tried, place=at, plans=())
 
 
 def _descend_there(

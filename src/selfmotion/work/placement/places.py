@@ -163,13 +163,13 @@ class Places:
         plans: list[Plan] = []
         for k, problem in enumerate(self.at(place)):
             try:
-                found = planned(k, problem)
+                plan = planned(k, problem)
             except SelfmotionError as error:
                 return Tried(place, np.inf, str(error))
-            if not found.certificate.verified:
-                return Tried(place, np.inf, found.certificate.verdict)
-            plans.append(found)
-        return Tried(place, sum(found.report.cost for found in plans), "", tuple(plans))
+            if not plan.certificate.verified:
+                return Tried(place, np.inf, plan.certificate.verdict)
+            plans.append(plan)
+        return Tried(place, sum(plan.report.cost for plan in plans), "", tuple(plans))
 
     def _moved(self, problem: Problem, by: SE3) -> Problem:
         items = problem.follows.items
@@ -258,10 +258,10 @@ def described(places: Places, problems: Sequence[Mapping[str, Any]]) -> dict[str
     }
 
 
-def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
+def restored(values: Mapping[str, Any], arms: dict[str, Any]) -> Places:
     """Return the places that `described` described."""
     return Places(
-        tuple(problem_from_dict(item, known) for item in values["problems"]),
+        tuple(problem_from_dict(item, arms) for item in values["problems"]),
         values["of"],
         frozenset(values["bodies"]),
         np.array(values["center"]),
@@ -269,14 +269,14 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
     )
 
 
-def _uninterrupted(found: Plan) -> Plan:
+def _uninterrupted(plan: Plan) -> Plan:
     """Return a plan; KeyboardInterrupt where Ctrl-C ended it."""
-    if found.report.status is Status.INTERRUPTED:
+    if plan.report.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
-    return found
+    return plan
 
 
-def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
+def _quickly(problem: Problem, near: Plan | None, search: Search | None, patience: float) -> Plan:
     """Plan, from what is known if anything is, or give up soon.
 
     Raises
@@ -304,12 +304,12 @@ def _quickly(problem: Problem, known: Plan | None, search: Search | None, patien
             raise KeyboardInterrupt
 
     try:
-        found = plan(problem, warm_start=known, search=search, callback=over, progress=told)
+        planned = plan(problem, warm_start=near, search=search, callback=over, progress=told)
     except KeyboardInterrupt:
         if presses() > pressed or not given_up:
             raise
         raise PlanError(f"no motion was found in {patience:g} s, by the processor's time") from None
-    return _uninterrupted(found) if presses() > pressed or not given_up else found
+    return _uninterrupted(planned) if presses() > pressed or not given_up else planned
 
 
 def _stands(item: BoundTaskFrame) -> bool:
@@ -362,12 +362,12 @@ def footprint(problems: Sequence[Problem], bodies: frozenset[str]) -> Array:
 
 def _middle(problems: Sequence[Problem]) -> Array:
     """Return the middle of the box around all paths (3,), in world axes."""
-    found = []
+    middle = []
     for problem in problems:
         frame = problem.follows.items[0].chain.base_placement
         places = problem.path.samples(spread_along(problem.path, 101)).translation
-        found.append(places @ frame.rotation.T + frame.translation)
-    points = np.concatenate(found)
+        middle.append(places @ frame.rotation.T + frame.translation)
+    points = np.concatenate(middle)
     return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 

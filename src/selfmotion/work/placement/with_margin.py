@@ -158,11 +158,18 @@ def plan_with_margin(
         raise ProblemError(f"plan_with_margin: of is {shown(of)}, expected {', '.join(_SUBJECTS)}")
     as_number(clearance, "plan_with_margin: clearance", least=0.0)
     about = None if center is None else as_numbers(center, "center", "(3,) [m]", (3,))
-    given: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
+    margin_options: dict[str, Any] = {
+        "part": part,
+        "tool": tool,
+        "center": about,
+        "clearance": clearance,
+    }
     first = plan(problem, **options).require()
     # The given warm start is for the first plan only.
     options.pop("warm_start", None)
-    search = _MarginSearch(problem, first, partial(shortfalls, wanted=margin, of=named, **given))
+    search = _MarginSearch(
+        problem, first, partial(shortfalls, wanted=margin, of=named, **margin_options)
+    )
     search.run(margin, clearance, options, progress)
     result = search.best or search.now
     return PlanWithMargin(
@@ -266,25 +273,25 @@ class _MarginSearch:
         return has_it and (not clearances or now.found.least <= 1.0 + _ENOUGH)
 
 
-def _is_interrupted(found: Plan) -> bool:
-    return found.report.status is Status.INTERRUPTED
+def _is_interrupted(plan: Plan) -> bool:
+    return plan.report.status is Status.INTERRUPTED
 
 
-def _rank(found: Plan) -> tuple[bool, float]:
-    return not found.certificate.verified, found.report.cost
+def _rank(plan: Plan) -> tuple[bool, float]:
+    return not plan.certificate.verified, plan.report.cost
 
 
 def _adjusted(
-    clearances: dict[tuple[str, str], float], found: Shortfalls, clearance: float
+    clearances: dict[tuple[str, str], float], shortfalls: Shortfalls, clearance: float
 ) -> dict[tuple[str, str], float]:
     """Return larger clearances where the margin is missing, smaller ones where it is exceeded.
 
     To first order the distance that a displacement uses is proportional to its size.
     """
-    spare = max(found.least - 1.0, 0.0)
+    spare = max(shortfalls.least - 1.0, 0.0)
     adjusted = {pair: far - spare * (far - clearance) for pair, far in clearances.items()}
     raised: dict[tuple[str, str], float] = {}
-    for item in found.items:
+    for item in shortfalls.items:
         pair = (min(item.pair), max(item.pair))
         far = (
             adjusted[pair] + (1.0 - item.scale) * item.used + _MORE
@@ -298,7 +305,7 @@ def _adjusted(
 
 def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
     """Return tolerances without what the displacement may use of them."""
-    found = []
+    narrowed = []
     for item in problem.relaxations:
         turns = item.rows[0].startswith("r")
         used = margin.rotation if turns else margin.position + lever * margin.rotation
@@ -307,17 +314,17 @@ def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]
                 f"plan_with_margin: the band of {', '.join(item.rows)} is {item.band:.3g}, of "
                 f"which the margin would use {used:.3g}; ask less, or allow more"
             )
-        found.append(replace(item, band=item.band - used))
-    return tuple(found)
+        narrowed.append(replace(item, band=item.band - used))
+    return tuple(narrowed)
 
 
 def _of_pairs(problem: Problem, clearances: dict[tuple[str, str], float]) -> list[Clearance]:
     """Return clearances of single pairs of bodies."""
-    found = []
+    pair_clearances = []
     bodies = {body.name: body for item in problem.clearances for body in item.obstacles}
     for pair, distance in clearances.items():
-        own = tuple(bodies[name] for name in pair if name in bodies)
-        every = dict.fromkeys(CollisionModel(problem.robot, own).pairs)
+        obstacles = tuple(bodies[name] for name in pair if name in bodies)
+        every = dict.fromkeys(CollisionModel(problem.robot, obstacles).pairs)
         others = tuple(names for names in every if set(names) != set(pair))
-        found.append(Clearance(own, distance, disabled=others))
-    return found
+        pair_clearances.append(Clearance(obstacles, distance, disabled=others))
+    return pair_clearances

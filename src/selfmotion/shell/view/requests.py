@@ -31,7 +31,7 @@ class Request:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Outcome:
     """What came of a request.
 
     Attributes
