@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -96,3 +98,22 @@ def test_comments_state_deviations_tolerances_and_axes(tmp_path: Path) -> None:
     lines.notes = [COMMENTS.text("axes", text="A1 = one [deg], A2 = one [deg]")]
     with pytest.raises(sm.errors.FileFormatError, match="two axes are the same joint"):
         comments.joints()
+
+
+def test_comments_state_where_the_work_object_was_planned(tmp_path: Path) -> None:
+    """By position [m] and quaternion x, y, z, w; a pose that is none is not."""
+    lines = lines_of(tmp_path)
+    comments = Comments(lines)
+    assert comments.program_frames(None, None).planned is None
+    half = 0.5**0.5
+    lines.notes = [
+        COMMENTS.text("poses", work="table", carrier="base link", flange="tool0"),
+        COMMENTS.text("planned work object", pose=[0.1, -0.2, 0.3, 0.0, 0.0, half, half]),
+    ]
+    found = comments.program_frames(None, None)
+    assert (found.work_name, found.carrier, found.flange) == ("table", "base link", "tool0")
+    assert found.planned is not None
+    np.testing.assert_allclose(found.planned.translation, [0.1, -0.2, 0.3])
+    np.testing.assert_allclose(pin.log3(found.planned.rotation), [0.0, 0.0, 0.5 * np.pi])
+    lines.notes[1] = COMMENTS.text("planned work object", pose=[0.1, -0.2, 0.3, 0.0, 0.0, 0.0, 0.0])
+    assert comments.program_frames(None, None).planned is None
