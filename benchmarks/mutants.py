@@ -209,6 +209,7 @@ PARTS = (
         ),
         (
             "controllers/test_program_lines.py",
+            "controllers/test_program_reader.py",
             "controllers/test_statements.py",
             "controllers/test_programs.py",
             "controllers/test_what_runs.py",
