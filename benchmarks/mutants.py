@@ -208,7 +208,11 @@ PARTS = (
             "shop/controllers/statements.py",
         ),
         (
+            "controllers/test_program_lines.py",
+            "controllers/test_program_reader.py",
+            "controllers/test_statements.py",
             "controllers/test_programs.py",
+            "controllers/test_what_runs.py",
             "controllers/test_pose_programs.py",
             "controllers/test_feed_programs.py",
         ),

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.shop.cam.drawing import read_drawing
+from selfmotion.shop.cam.drawing import _GAP_TOLERANCE, _joined_ends, read_drawing
 from support.shell import complaint as refused
 
 # What chords may be off curves [m], as the docs say; rounding of a drawing in mm.
@@ -423,3 +423,44 @@ def test_legs_of_a_drawing_are_followed_at_the_feed(tmp_path: Path) -> None:
         assert speeds.max() == pytest.approx(0.03, rel=1e-3)
         assert (speeds[away < 1e-6] < 1e-2).all()
         np.testing.assert_allclose(samples.rotation[:, 2, 2], -1.0)
+
+
+@pytest.mark.parametrize("flag", [2, 4, 16, 64])
+def test_polylines_that_are_fitted_or_meshes_are_refused(tmp_path: Path, flag: int) -> None:
+    """Their corners are not on what is seen."""
+
+    def draw(space: Any) -> None:
+        line = space.add_polyline2d([(0, 0), (10, 5), (20, 0)])
+        line.dxf.flags = line.dxf.flags | flag
+
+    with pytest.raises(sm.errors.FileFormatError, match="a mesh, or fitted by a curve; explode it"):
+        rows_of(tmp_path, draw)
+
+
+def test_three_ends_in_a_chain_are_not_joined_whichever_is_in_the_middle() -> None:
+    """Which two of them belong together nobody knows; two that meet do."""
+    chain = 0.8 * _GAP_TOLERANCE * np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    apart = np.array([[1.0, 0, 0], [1.0, 0.5 * _GAP_TOLERANCE, 0]])
+    for order in permutations(range(3)):
+        found = _joined_ends(np.concatenate([chain[list(order)], apart]))
+        assert found.tolist() == [-1, -1, -1, 4, 3]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("turn", [90.0, 300.0, 358.5])
+def test_arcs_of_polylines_go_round_to_the_side_of_their_bulge(
+    tmp_path: Path, side: float, turn: float
+) -> None:
+    """Also where one comes back nearly to where it began."""
+    bulge = side * np.tan(np.radians(0.25 * turn))
+    chord = 10.0 * 2.0 * np.sin(np.radians(0.5 * turn))
+    points = [(0.0, 0.0, bulge), (chord, 0.0, 0.0), (chord + 5.0, 0.0, 0.0)]
+    found = rows_of(tmp_path, lambda s: s.add_lwpolyline(points, format="xyb"))
+    (rows,) = found.values()
+    places = 1e3 * np.array(rows.positions)
+    np.testing.assert_allclose(places[[0, -2, -1], 0], [0.0, chord, chord + 5.0], atol=ROUNDING)
+    # The area between the arc and its chord, by its sign.
+    x, y = places[:-1, 0], places[:-1, 1]
+    area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    angle = np.radians(turn)
+    assert area == pytest.approx(side * 50.0 * (angle - np.sin(angle)), rel=0.01)

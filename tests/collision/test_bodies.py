@@ -144,9 +144,14 @@ def test_a_flat_mesh_is_a_surface(tmp_path: Path, tilt: float) -> None:
         ([[1, 1, 1]] * 3, [[0, 1, 2]], "on one line|cannot be read"),
         ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "corner 2 .* not finite"),
         ([[0, 0, 0], [1, 0, 0], [0, np.inf, 0]], [[0, 1, 2]], "corner 2 .* not finite"),
+        (
+            [[0, 0, 0], [np.inf, 0, 0], [0, np.nan, 0]],
+            [[0, 1, 2]],
+            r"corner 1 of its mesh is at \[inf, .*, not finite",
+        ),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [], "cannot be read"),
     ],
-    ids=["needle", "point", "nan", "inf", "no triangles"],
+    ids=["needle", "point", "nan", "inf", "two", "no triangles"],
 )
 def test_a_mesh_that_is_no_body_is_refused_by_name(
     tmp_path: Path, points, faces, message: str

@@ -100,13 +100,14 @@ def test_collides_says_what_distance_says(name: str) -> None:
 
 def test_worst_is_the_smallest_distance_and_its_row(panda: RobotModel) -> None:
     model = CollisionModel(panda, BOXES)
-    motion = np.linspace(*samples(panda, 2), 50)
-    every = [model.distance(q) for q in motion]
-    worst = model.worst(motion)
-    row = int(np.argmin([clearance.value for clearance in every]))
-    assert worst.index == row
-    assert worst.value == pytest.approx(every[row].value, abs=GJK)
-    assert (worst.first, worst.second) == (every[row].first, every[row].second)
+    there = np.linspace(*samples(panda, 2), 50)
+    for motion in (there, there[::-1]):
+        every = [model.distance(q) for q in motion]
+        worst = model.worst(motion)
+        row = int(np.argmin([clearance.value for clearance in every]))
+        assert worst.index == row
+        assert worst.value == pytest.approx(every[row].value, abs=GJK)
+        assert (worst.first, worst.second) == (every[row].first, every[row].second)
 
 
 @pytest.mark.parametrize(
@@ -307,3 +308,64 @@ def test_nearest_points_are_as_far_apart_as_the_bodies() -> None:
     assert apart > 10
     with pytest.raises(CollisionError, match="no pair that is checked"):
         model.nearest_points(q, "ball", "ball")
+
+
+def test_groups_part_the_pairs_by_what_is_no_link(panda: RobotModel) -> None:
+    """Each pair is in the group of its obstacle, or in that of the arm itself."""
+    balls = [Sphere(name, [0.6, x, 0.4], 0.05) for name, x in (("a", 0.4), ("b", -0.4))]
+    model = CollisionModel(panda, balls)
+    groups = model.groups
+    assert list(groups) == ["the arm itself", "a", "b"]
+    for name, group in groups.items():
+        assert group.pairs
+        for pair in group.pairs:
+            assert {"a", "b"} & set(pair) == ({name} if name in "ab" else set())
+    every = [pair for group in groups.values() for pair in group.pairs]
+    assert sorted(every) == sorted(model.pairs)
+
+
+def test_what_goes_beyond_its_limits_lengthens_levers_of_what_turns() -> None:
+    """Joints that slide, and those that move both bodies or none, have no longer ones."""
+    robot = load_robot("tiago")
+    model = CollisionModel(robot)
+    farthest = np.array([max(abs(x), abs(y)) for x, y in zip(*robot.finite_limits(), strict=True)])
+    slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
+    beyond = farthest + np.where(slides, 0.3, 0.0)
+    usual, longer = (model.pair_levers_up_to(each) for each in (farthest, beyond))
+    np.testing.assert_allclose(usual, model.pair_levers)
+    assert slides.any()
+    np.testing.assert_array_equal(longer[:, slides], usual[:, slides])
+    np.testing.assert_array_equal(longer[usual == 0.0], 0.0)
+    turned = (
+        longer[:, ~slides][usual[:, ~slides] > 0.0] - usual[:, ~slides][usual[:, ~slides] > 0.0]
+    )
+    np.testing.assert_allclose(turned, 0.3)
+
+
+def test_a_mesh_in_millimetres_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "cube.stl"
+    trimesh.creation.box([300.0, 200.0, 100.0]).export(file)
+    with pytest.raises(CollisionError, match=r"is 300 m long: scale = 0\.001"):
+        Mesh("cube", [0.0, 0.0, 0.0], file).geometry()
+    found = Mesh("cube", [0.0, 0.0, 0.0], file, scale=1e-3).geometry()
+    corners = np.array(found.vertices()).reshape(-1, 3)
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.3, 0.2, 0.1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda", "tiago"])
+def test_joints_of_a_pair_are_those_that_move_one_body_past_the_other(name: str) -> None:
+    """By Pinocchio; configurations that agree in these count as one."""
+    robot, rng = load_robot(name), np.random.default_rng(0)
+    model = CollisionModel(robot)
+    data, q = robot.model.createData(), rng.uniform(*robot.finite_limits())
+
+    def placed(at: np.ndarray) -> list[pin.SE3]:
+        pin.forwardKinematics(robot.model, data, robot.coupling.spread(at))
+        return [data.oMi[body.joint] * body.place for body in model.every_body]
+
+    before = placed(q)
+    for joint in range(robot.dof):
+        after = placed(q + 0.1 * np.eye(robot.dof)[joint])
+        for pair, (i, j) in enumerate(model.index):
+            still = (before[i].inverse() * before[j]).isApprox(after[i].inverse() * after[j], 1e-9)
+            assert model._near._moving[pair, joint] == (not still)

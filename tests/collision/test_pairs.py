@@ -43,8 +43,11 @@ def test_a_pair_left_out_takes_no_other_pair_along(panda: RobotModel) -> None:
     """The hand and both fingers, which are held, are one rigid part with link 7."""
     every = set(CollisionModel(panda).pairs)
     for pair in (("panda_link4", "panda_link7"), ("panda_link4", "panda_hand")):
-        left = set(CollisionModel(panda, disabled=[pair]).pairs)
-        assert every - left == {pair}
+        model = CollisionModel(panda, disabled=[pair])
+        assert every - set(model.pairs) == {pair}
+        # It is told, and nothing else.
+        assert model.disabled == (pair,)
+    assert CollisionModel(panda).disabled == ()
 
 
 def test_links_that_touch_by_design_are_no_pair(panda: RobotModel) -> None:

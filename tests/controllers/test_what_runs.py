@@ -460,8 +460,9 @@ def test_lines_end_where_controllers_end_them(
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (r"BAS\(#VEL_PTP, 10\)", "BAS(#VEL_PTP, 100)", "nothing has judged it"),
-        (r"  BAS\(#(VEL|ACC)_PTP, 10\)\n", "", "nothing has judged it"),
+        (r"BAS\(#VEL_PTP, 10\)", "BAS(#VEL_PTP, 100)", "VEL_PTP.* 100 %.*nothing has judged it"),
+        (r"BAS\(#ACC_PTP, 10\)", "BAS(#ACC_PTP, 100)", "ACC_PTP.* 100 %.*nothing has judged it"),
+        (r"  BAS\(#(VEL|ACC)_PTP, 10\)\n", "", "VEL_PTP.* 0 %.*nothing has judged it"),
         (r"  BAS\(#INITMOV, 0\)\n((?:.*\n)*?)(  PTP)", r"\1  BAS(#INITMOV, 0)\n\2", "first"),
     ],
 )

@@ -155,6 +155,23 @@ def test_steps_end_where_no_product_is_far_below_their_mean() -> None:
     )
 
 
+def test_room_is_a_share_of_a_limit() -> None:
+    """Of small limits it is room itself, and what has none has all."""
+    rng = np.random.default_rng(8)
+    rows = banded.BandedRows(
+        rng.normal(size=(3, 4, 2)), -rng.uniform(0.1, 9.0, (4, 2)), rng.uniform(0.1, 9.0, (4, 2))
+    )
+    rows.upper[1, 0] = np.inf
+    c = rng.normal(size=6)
+    reached = np.array([[rows.matrix[:, k, m] @ c[k : k + 3] for m in range(2)] for k in range(4)])
+    above, below = banded._room(rows, c)
+    known = np.isfinite(rows.upper)
+    sizes = np.maximum(np.abs(rows.upper[known]), 1.0)
+    np.testing.assert_allclose(above[known], (rows.upper - reached)[known] / sizes)
+    assert (above[~known] == np.inf).all()
+    np.testing.assert_allclose(below, (reached - rows.lower) / np.maximum(np.abs(rows.lower), 1.0))
+
+
 def test_rows_are_added_with_their_neighbours() -> None:
     """As far as there are limits: twenty to both sides."""
     room = np.ones((60, 2))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import silent
-from selfmotion.work.placement import corners
-from selfmotion.work.placement.corners import Corner, _Corners
+from selfmotion.work.placement import Corner, corners
+from selfmotion.work.placement.corners import _Corners
 
 # Largest size that is looked for [m].
 MOST = 1.0

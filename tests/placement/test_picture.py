@@ -14,6 +14,8 @@ from selfmotion.work.placement.picture import _share, picture_of
 ACROSS, UP = np.linspace(-0.2, 0.3, 6), np.linspace(0.1, 0.5, 9)
 # Numbers in the picture have one digit after the point.
 DRAWN = 0.11
+# Lines are apart by this many sizes of their letters.
+EASY = 1.4
 
 
 def cost(x: float, y: float) -> float:
@@ -87,7 +89,10 @@ def test_numbers_of_axes_stand_at_their_columns_and_rows() -> None:
     # Those of both axes are alike, and smaller than their names.
     sizes = {part.get("font-size") for part in (*beside, *below[:-1])}
     assert len(sizes) == 1
-    assert float(sizes.pop() or 0) < numbers(below[-1], "font-size")[0]
+    size, y = numbers(below[-1], "font-size", "y")
+    assert float(sizes.pop() or 0) < size
+    # Lines of text have room: as far apart as lines of a page that is easy to read.
+    assert y - numbers(below[0], "y")[0] >= EASY * size
 
 
 def test_names_of_axes_are_in_their_middles() -> None:

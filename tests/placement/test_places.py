@@ -7,6 +7,7 @@ from scipy.spatial import ConvexHull
 
 import selfmotion as sm
 from selfmotion.model.robot import with_moved_base
+from selfmotion.work.placement import places as module
 from selfmotion.work.placement.places import footprint, places_of
 
 # Half of the sizes of a block, and where it stands [m].
@@ -49,3 +50,12 @@ def test_a_part_is_turned_about_the_middle_of_its_path() -> None:
     places = places_of([problem], "part", ["block"], None, ("yaw",))
     ends = [problem.path.pose(t).translation for t in (0.0, 2.0)]
     np.testing.assert_allclose(places.center, np.mean(ends, axis=0), atol=ROUNDING)
+
+
+def test_quick_looks_are_quicker_the_more_is_known() -> None:
+    """Beside known motions with fewer starts and less time; no more are ended than begun."""
+    near, quick = module._NEAR, module._QUICK
+    for search in (near, quick):
+        assert 1 <= search.finalists <= search.starts
+    assert near.starts < quick.starts < sm.Search().starts
+    assert module._PATIENCE_NEAR < module._PATIENCE < module._PATIENCE_SURE

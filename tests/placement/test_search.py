@@ -7,8 +7,8 @@ import pytest
 
 from selfmotion.basics import Array
 from selfmotion.planning.result import Plan
-from selfmotion.work.placement import search
-from selfmotion.work.placement.places import Places, Tried
+from selfmotion.work.placement import Tried, search
+from selfmotion.work.placement.places import Places
 from selfmotion.work.placement.search import Box, Descent
 
 LOW, HIGH = np.array([-1.0, 2.0]), np.array([1.0, 6.0])

@@ -85,6 +85,26 @@ def test_a_margin_that_is_there_costs_nothing(problem: sm.Problem) -> None:
     assert small.extra_cost == 0.0
 
 
+def test_other_routes_are_looked_for_once_and_none_where_the_margin_is_there(
+    problem: sm.Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each round goes on from the plan before; past bodies, the first begins anew as well."""
+    whole = with_margin.plan
+    begun: list[bool] = []
+
+    def noted(asked: sm.Problem, **options: object) -> sm.Plan:
+        begun.append("warm_start" in options)
+        return whole(asked, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(with_margin, "plan", noted)
+    assert sm.plan_with_margin(problem, sm.Margin(1e-4)).reached
+    assert begun == [False]
+    begun.clear()
+    assert sm.plan_with_margin(problem, WANTED, of=("part", "base")).reached
+    assert begun[:3] == [False, True, False]
+    assert all(begun[3:])
+
+
 def test_a_margin_that_no_motion_has_is_not_claimed(problem: sm.Problem) -> None:
     large = sm.plan_with_margin(problem, sm.Margin(0.5), of="part", deadline=1.0)
     assert not large.reached

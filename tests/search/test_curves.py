@@ -9,6 +9,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search import SelfMotion
+from selfmotion.planning.search.curves import curves_along
 from support.followed import standing
 
 
@@ -105,3 +106,16 @@ def test_points_of_curves_are_found_where_they_were_asked_for(arm: sm.RobotModel
     np.testing.assert_allclose(along, arc, atol=1e-9)
     assert np.all(found.locate(q + np.array([0.0, 0.3, 0.0]))[0] == -1)
     assert np.all(found.locate(q + 1e-3)[0] == number)
+
+
+def test_progress_goes_from_the_first_waypoint_to_the_last(arm: sm.RobotModel) -> None:
+    path = sm.paths.Line(level(1.2, 1.6), level(1.3, 1.6), 1.0)
+    follows = Follows.of(arm, path, "planar")
+    told: list[tuple[int, int]] = []
+    seeds = np.random.default_rng(1).uniform(-3.0, 3.0, (4, 3))
+    targets = follows.targets(np.linspace(0.0, 1.0, 4))
+    found = curves_along(
+        SelfMotion(follows, 0.1), targets, seeds, 2, lambda _, k, count: told.append((k, count))
+    )
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert len(found) == 4

@@ -1,16 +1,25 @@
 """When the search looks at the path."""
 
+import importlib
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.model.follow import completed, only_tip
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times
+from selfmotion.planning.search.manifold import OnPath
+from selfmotion.planning.search.shortest import Shortest
+from selfmotion.planning.search.vertices import Admissible
 from support.arms import PANDA_HOME
 from support.stretching import DURATION, rounded_problem, stretching
+
+# A function of its door has the same name.
+guides = importlib.import_module("selfmotion.planning.search.guides")
 
 
 def level(x: float, y: float) -> pin.SE3:
@@ -38,6 +47,46 @@ def test_the_search_looks_as_the_tool_moves_on() -> None:
     # 0.02 m, by interpolation between 2,000 looks.
     assert strides.max() < 0.022
     assert np.sum((t > 1.0) & (t < 5.0)) < 0.1 * len(t)
+
+
+@pytest.mark.parametrize("strides", [150.01, 199.99, 250.5])
+def test_no_stride_of_the_search_is_longer_than_the_longest(strides: float) -> None:
+    """And there are no more times than that takes."""
+    length = strides * guides._STRIDE
+    line = sm.paths.Line(level(0.0, 0.0), level(length, 0.0), 3.0, time_law="constant")
+    t = search_times(line, 2)
+    assert len(t) == np.ceil(strides) + 1
+    assert np.diff(line.samples(t).translation[:, 0]).max() <= guides._STRIDE * (1.0 + 1e-9)
+
+
+def test_chains_keep_a_little_of_limits_and_speeds_for_what_is_between_waypoints(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = panda.dexterous_configuration()
+    path = sm.paths.Circle.around(panda.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
+    fastest = 0.7
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(fastest)]
+    formulation = Formulation.of(sm.Problem(panda, path, constraints=limits, clearance=None))
+    noted: list[tuple[Admissible, Array]] = []
+
+    class Noted(Shortest):
+        def __init__(self, waypoints: OnPath, bounds: Admissible, steps: Array, weights: Array):
+            noted.append((bounds, steps))
+            super().__init__(waypoints, bounds, steps, weights)
+
+    monkeypatch.setattr(guides, "Shortest", Noted)
+    t = np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0])
+    motions, arrived = carried(formulation.follows, start[None], t)
+    assert arrived.all()
+    assert shortest_along(formulation, t, motions[0], t, (1.0,)) is not None
+    ((bounds, steps),) = noted
+    allowed = formulation.envelope
+    for kept in (bounds.lower - allowed.lower, allowed.upper - bounds.upper):
+        assert (kept > 0.0).all()
+        assert kept.max() < 1e-3
+    shares = steps / (fastest * np.diff(t)[:, None])
+    assert (shares <= 1.0).all()
+    assert (shares >= 0.9).all()
 
 
 def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:

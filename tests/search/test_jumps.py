@@ -85,6 +85,21 @@ def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (found[0].first, found[-1].last) == (0, len(segments.t) - 1)
 
 
+def test_chains_are_found_once_where_none_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, _, _ = motion("planar_3r", "planar")
+    segments = ChainSegments.of(Formulation.of(problem.changed(start="free")))
+    whole, calls = ChainSegments._found, []
+
+    def noted(self: ChainSegments, forbidden: set[int]) -> list[ChainSegment]:
+        calls.append(forbidden)
+        return whole(self, forbidden)
+
+    monkeypatch.setattr(ChainSegments, "_found", noted)
+    found = segments.fewest({3})
+    assert not any(_jumps(segments, item) for item in found)
+    assert calls == [{3}]
+
+
 def _jumps(segments: ChainSegments, item: ChainSegment) -> bool:
     times, q = item.t, item.q
     return bool(jumps_of(segments.formulation, times[:-1], times[1:], q[:-1], q[1:]).any())

@@ -57,6 +57,13 @@ def test_faster_steps_count_as_spread_over_the_time_that_they_take() -> None:
     # At twice the mean speed v: ½v² over |Δq| / v.
     speed = 2.0 * moved / 0.2
     assert measure.at_pace_of(jump).of(jump) == pytest.approx(0.5 * speed * moved)
+    # Of three times the duration the mean is a third: the jump lasts longer than its step.
+    longer = RunningCost.by(charging(robot, task, [sm.costs.JointVelocity()]), 0.1 * np.arange(4.0))
+    jump = np.vstack([jump, jump[-1:]])
+    speed = 2.0 * moved / 0.3
+    assert longer.at_pace_of(jump).of(jump) == pytest.approx(0.5 * speed * moved)
+    # What stands still has no pace.
+    assert measure.at_pace_of(jump[1:]).speed == np.inf
 
 
 def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:

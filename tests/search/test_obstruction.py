@@ -9,9 +9,8 @@ from scipy.interpolate import make_interp_spline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search import SPACING, Obstruction, obstruction, single_poses
+from selfmotion.planning.search import SPACING, Obstruction, SinglePoses, obstruction, single_poses
 from selfmotion.planning.search.obstruction import least_deviation, least_excess, nearest_place
-from selfmotion.planning.search.single_poses import SinglePoses
 from support.arms import PANDA_HOME, robot_named
 
 # Remedies are as tight as their last round, and the path is moved a bit farther than it has to be.

@@ -8,7 +8,7 @@ from selfmotion.basics import Array, NoSequenceError, silent
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search import Manifold
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.sampled import sampled_layers
+from selfmotion.planning.search.sampled import _STARTS, _starts, sampled_layers
 from selfmotion.planning.search.sequences import best_sequences
 from selfmotion.planning.search.vertices import Admissible
 from support.arms import robot_named
@@ -64,6 +64,21 @@ def test_it_is_not_longer_than_following_from_the_same_start() -> None:
         length += float(np.abs(following - q).sum())
         q = following
     assert best.length <= length * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "task"), [("panda", "pose"), ("xarm7", "pose"), ("ur5", "pointing")]
+)
+def test_a_quarter_of_what_is_drawn_anywhere_comes_onto_the_path(name: str, task: str) -> None:
+    """However far that is from there: so all starts that are wanted are found."""
+    robot = robot_named(name)
+    path, limits = line_of(robot, task), (robot.lower, robot.upper)
+    waypoints = OnPath(Follows.of(robot, path, task), np.array([0.0, 1.0, 2.0]), *limits)
+    bounds = Admissible(*limits, robot.is_revolute, ())
+    found = _starts(waypoints, bounds, 1, np.random.default_rng(0))
+    assert len(found) == _STARTS
+    for q in found:
+        assert max(sm.Task.of(task).miss(path.pose(1.0), robot.pose(q))) < 1e-9
 
 
 def test_a_path_that_nothing_follows_says_when() -> None:

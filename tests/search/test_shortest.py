@@ -9,6 +9,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.search import shortest
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, RunningCost
 from selfmotion.planning.search.shortest import Shortest, improved_by
@@ -120,3 +121,11 @@ def test_what_costs_more_than_its_length_becomes_cheaper() -> None:
     found = best_of(chain, measure)(chain.q, False)
     assert measure.of(found) < 0.9 * measure.of(chain.q)
     assert chain.kept().keep(found).all()
+    # Samples around it hold nothing that is much cheaper: rounds end where they gain no more.
+    ring = shortest._ROUGH_RINGS[-1]
+    steps = np.full((COUNT - 1, chain.robot.dof), 0.5)
+    again = shortest._cheaper(
+        chain.waypoints, chain.kept(), steps, measure, found, (ring,), shortest._ROUGH_SIDE
+    )
+    gain = 1.0 - measure.of(again) / measure.of(found)
+    assert 0.0 <= gain <= 2.0 * shortest._GAIN

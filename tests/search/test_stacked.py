@@ -20,6 +20,8 @@ WITHIN = 1.0
 MET = 0.02
 # What is put onto the path is there to this [m, rad].
 ON_PATH = 1e-9
+# Of steps whose equations are damped.
+DAMPED = 1e-3
 
 
 def carried(problem: sm.Problem, weights: Array, places: int = 49) -> tuple[Array, Array]:
@@ -119,3 +121,31 @@ def test_a_joint_stops_at_its_limit() -> None:
     after = motion(upper)
     assert misses(free, t, after) <= ON_PATH
     assert after[:, 0].max() <= upper[0] + MET
+
+
+def test_rows_that_do_not_bind_have_no_part_in_a_step() -> None:
+    """Far from all limits a step is that of the task alone, the shortest by the weights."""
+    robot = robot_named("panda")
+    q = np.array(sm.NAMED_ARMS["panda"].home)[None]
+    problem = sm.Problem(robot, sm.paths.Dwell(robot.pose(q[0]), 1.0), "position", start=q[0])
+    follows, weights = Formulation.of(problem).follows, np.linspace(0.5, 2.0, 7)
+    wide = q[0] - 2.0, q[0] + 2.0
+    along = np.array([0.01, -0.02, 0.03])
+    step = Stacked(follows, (), *wide, weights)._step(q, along)[0]
+    jacobian = follows.jacobian(q[0])
+    light = np.diag(1.0 / weights)
+    expected = light @ jacobian.T @ np.linalg.solve(jacobian @ light @ jacobian.T, along)
+    np.testing.assert_allclose(step, expected, atol=DAMPED * np.abs(expected).max())
+
+
+def test_each_part_is_heavy_in_turn_and_others_are_as_usual() -> None:
+    """So is each joint of a part of few."""
+    robot = downhand(0.3).robot
+    coordinates = Coordinates.of(robot)
+    usual, *heavy = metrics(coordinates)
+    np.testing.assert_allclose(usual, np.asarray(coordinates.weights) ** 2)
+    assert len(heavy) > 2
+    for weights in heavy:
+        ratios = weights / usual
+        assert set(np.unique(ratios.round(9))) == {1.0, ratios.max().round(9)}
+        assert ratios.max() > 10.0

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow import within_limits
+from selfmotion.model.follow import Follows, within_limits
 from selfmotion.planning.search import carried, start_candidates
-from support.arms import Case
+from selfmotion.planning.search.chains import UNLIKE
+from support.arms import Case, robot_named
+from support.paths import line_of
 from support.two_arms import both_arms
 
 # Newton's method ends at this [m].
@@ -30,6 +32,20 @@ def test_starts_are_on_the_path_at_their_time(case: Case, share: float) -> None:
     assert starts
     assert misses(problem, np.array(starts), np.full(len(starts), time)) <= ON_PATH
     assert all((q >= robot.lower).all() and (q <= robot.upper).all() for q in starts)
+
+
+@pytest.mark.parametrize(("name", "task"), [("ur5", "pose"), ("panda", "position")])
+def test_no_two_starts_are_near_each_other(name: str, task: str) -> None:
+    """Where self-motions are no curves; of an arm without one the same solutions come often."""
+    robot = robot_named(name)
+    follows = Follows.of(robot, line_of(robot, task), task)
+    # Within one turn.
+    most = np.full(robot.dof, np.pi)
+    follows = within_limits(follows, np.maximum(robot.lower, -most), np.minimum(robot.upper, most))
+    starts = np.array(start_candidates(follows, 40, np.random.default_rng(0)))
+    assert len(starts) > 2
+    apart = np.linalg.norm(starts[:, None] - starts, axis=2)
+    assert (apart[~np.eye(len(starts), dtype=bool)] > UNLIKE).all()
 
 
 @pytest.mark.parametrize("at", [0, 4, 8])
@@ -56,6 +72,9 @@ def test_within_narrow_limits_there_are_some_as_well(number: int) -> None:
     lower, upper = start - below, start + above
     starts = start_candidates(within_limits(follows, lower, upper), 8, np.random.default_rng(0))
     assert starts
+    # None is near another one.
+    apart = np.linalg.norm(np.array(starts)[:, None] - starts, axis=2)
+    assert (apart[~np.eye(len(starts), dtype=bool)] > UNLIKE).all()
     for q in starts:
         assert ((q >= lower) & (q <= upper)).all()
         for item in follows.items:
