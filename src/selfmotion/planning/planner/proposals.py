@@ -131,7 +131,7 @@ def optimise_where_it_breaks(
     known = _pushed(planner, starts, t, at)[:finalists]
     _optimise_each(planner, _guesses(planner, known), len(known))
     ranking = _ranking(planner)
-    if planner.is_unmet and ranking.run(starts, finalists, at):
+    if ranking.run(starts, finalists, at):
         _optimise_motions(planner, ranking.ranked)
 
 
