@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.shop.controllers.program_comments import COMMENTS, Comments
-from selfmotion.shop.controllers.program_lines import _LARGEST, _LINE, Lines
+from selfmotion.shop.controllers.program_lines import _LINE, _MAX_QUANTITY, Lines
 
 
 def lines_of(folder: Path, text: str = "") -> Lines:
@@ -55,21 +55,27 @@ def test_numbers_are_those_that_controllers_write(tmp_path: Path, text: str, val
 
 
 @pytest.mark.parametrize(
-    "text", ["", "x", "nan", "inf", "1_0", "0x1", "1e", "--1", "1e10", "-1e11", "0" * 41, "1.2.3"]
+    "text", ["", "x", "nan", "inf", "1_0", "0x1", "1e", "--1", "0" * 41, "1.2.3"]
 )
 def test_what_is_no_number_is_refused_with_its_beginning(tmp_path: Path, text: str) -> None:
     with pytest.raises(sm.errors.FileFormatError) as error:
         lines_of(tmp_path).number_of(text)
-    assert f"'{text[:40]}' is no number that is meant" in str(error.value)
+    assert f"'{text[:40]}' is no number, such as" in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["1e10", "-1e11"])
+def test_numbers_that_no_controller_writes_are_too_large(tmp_path: Path, text: str) -> None:
+    with pytest.raises(sm.errors.FileFormatError, match=f"number {text} is too large"):
+        lines_of(tmp_path).number_of(text)
 
 
 def test_coordinates_and_times_have_a_range(tmp_path: Path) -> None:
     lines = lines_of(tmp_path)
-    assert lines.coordinate(f"-{_LARGEST:.0f}") == -_LARGEST
+    assert lines.coordinate(f"-{_MAX_QUANTITY:.0f}") == -_MAX_QUANTITY
     assert lines.duration("0.001") == 0.001
     for read, text in (
-        *((lines.coordinate, f"{2.0 * _LARGEST:.0f}"), (lines.duration, "0")),
-        *((lines.duration, "-1"), (lines.duration, f"{2.0 * _LARGEST:.0f}")),
+        *((lines.coordinate, f"{2.0 * _MAX_QUANTITY:.0f}"), (lines.duration, "0")),
+        *((lines.duration, "-1"), (lines.duration, f"{2.0 * _MAX_QUANTITY:.0f}")),
     ):
         with pytest.raises(sm.errors.FileFormatError, match=r"line 0: (coordinate|time)"):
             read(text)

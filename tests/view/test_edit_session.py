@@ -35,6 +35,7 @@ def planned(file):
     return sm.plan(job.problem, **job.settings)
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     ("name", "by"),
     [

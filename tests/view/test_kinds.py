@@ -163,6 +163,7 @@ def test_a_plan_is_shown_as_it_is_changed_and_saved_with_its_problem(plan, tmp_p
         np.testing.assert_array_equal(session.found.plan.trajectory.q, plan.trajectory.q)
 
 
+@pytest.mark.site
 def test_a_second_plan_is_shown_beside(page, plan, tmp_path):
     """Its numbers stand beside the own ones, its arm is the ghost; what is no plan is refused."""
     file = tmp_path / "circle.npz"

@@ -3,12 +3,11 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from selfmotion.work.placement.found import Placement
 
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.result import Plan
-from selfmotion.work.placement import Tried
+from selfmotion.work.placement import Placement, Tried
 from selfmotion.work.placement.places import Places
 from selfmotion.work.placement.search import Box
 
