@@ -7,6 +7,7 @@ import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import SinglePoses, carried_within, inside, pushed
 from selfmotion.planning.search.pushing import Pushing
+from selfmotion.problem.constraints import NO_OVERLAP
 from support.arms import PANDA_HOME, robot_named
 
 # Newton's method ends this near to its pose [m, rad].
@@ -70,7 +71,40 @@ def test_what_no_self_motion_leads_out_of_stays_nowhere() -> None:
     stuck = problem.changed(clearance=sm.constraints.Clearance([ball], DISTANCE))
     assert not len(pushed(poses_of(stuck), 0.0, PANDA_HOME[None]))
     alone = poses_of(problem.changed(clearance=None))
-    assert not len(Pushing(alone.follows, alone.bounds).free(PANDA_HOME[None], lambda q: (q, q)))
+    none = np.zeros(alone.coordinates.dof, dtype=bool)
+    pushing = Pushing(alone.follows, alone.bounds)
+    assert not len(pushing.free(PANDA_HOME[None], lambda q: (q, q), none))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_outside_of_its_window_a_tolerance_changes_nothing(seed: int) -> None:
+    """What is found is what is found without it, from the same configurations."""
+    off = np.random.default_rng(seed).uniform(-0.02, 0.02, 3)
+    plain = beside_the_elbow(MEETS)
+    ball = plain.clearances[0].obstacles[0]
+    moved = sm.obstacles.Sphere("ball", ball.pose.translation + off, 0.05)
+    plain = plain.changed(clearance=sm.constraints.Clearance([moved], DISTANCE))
+    later = plain.changed(relaxations=[sm.Relaxation("z", 2e-3, during=(3.0, 4.0))])
+    found = []
+    for problem in (plain, later):
+        poses = poses_of(problem)
+        q = np.zeros((1, poses.coordinates.dof))
+        q[0, : problem.robot.dof] = PANDA_HOME
+        found.append(pushed(poses, 0.0, q)[:, : problem.robot.dof])
+    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("clearance", [None, NO_OVERLAP])
+def test_a_joint_with_hardly_any_range_has_narrower_limits_within_these(clearance: object) -> None:
+    problem = beside_the_elbow(MEETS)
+    narrow = 4e-4
+    lower, upper = problem.robot.lower.copy(), problem.robot.upper.copy()
+    lower[0], upper[0] = -narrow, narrow
+    limits = sm.constraints.JointPositionLimits(lower, upper)
+    poses = inside(poses_of(problem.changed(constraints=[limits], clearance=clearance)))
+    assert (poses.bounds.lower < poses.bounds.upper).all()
+    assert (poses.bounds.lower >= lower).all()
+    assert (poses.bounds.upper <= upper).all()
 
 
 def test_motions_through_a_configuration_are_on_the_path_within_limits() -> None:

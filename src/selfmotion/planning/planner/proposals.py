@@ -143,10 +143,12 @@ def _pushed(planner: Planner, starts: abc.Sequence[Array], t: Array, at: int) ->
     """
     from scipy.interpolate import CubicSpline
 
+    if not planner.formulation.envelope_without_arm.bodies:
+        return []
     # Motions at their limits break them between nodes.
     poses = inside(SinglePoses(planner.formulation, np.random.default_rng(0)))
     q = np.array(starts)
-    if not poses.bounds.bodies or poses.bounds.keep(q).any():
+    if poses.bounds.keep(q).any():
         return []
     best, follows = planner.incumbent, planner.formulation.follows
     if best is not None:

@@ -371,6 +371,10 @@ class OnPath:
         self.robot, self.coordinates = follows.robot, follows.coordinates
         self._held, self.redundancy = follows.held(t), follows.redundancy
 
+    def held(self, i: int) -> Flags:
+        """Return the mask of coordinates that stand at 0 at waypoint i, (n,)."""
+        return np.asarray(self._held[i])
+
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
         """Return the result of Newton's method from q (K, n) at waypoint i, and its convergence."""
         return self._manifold.project(q, self._targets[i], far=far, held=self._held[i])

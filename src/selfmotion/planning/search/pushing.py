@@ -54,16 +54,17 @@ class Pushing:
         bodies = self._bounds.bodies
         return [(ClearanceModel(exact, far + _NEAR), far) for exact, far in bodies]
 
-    def free(self, q: Array, project: Project) -> Array:
+    def free(self, q: Array, project: Project, held: Flags) -> Array:
         """Return free configurations that are reached from q (K, n) on the path, (K', n).
 
-        As soon as there are some; none if all of them end elsewhere.
+        As soon as there are some; none if all of them end elsewhere. Coordinates that are `held`
+        (n,) stay at 0.
         """
         if not self._bounds.bodies or not len(q):
             return q[:0]
         q = self._nearly_free(q)
         for _ in range(_STEPS):
-            moved, arrived = project(q + self._steps(q))
+            moved, arrived = project(q + self._steps(q, held))
             free = moved[arrived][self._bounds.keep(moved[arrived])]
             if len(free):
                 return np.asarray(free)
@@ -88,9 +89,11 @@ class Pushing:
             found.append((np.maximum(far + _MARGIN - distances.values, 0.0), slopes))
         return found
 
-    def _steps(self, q: Array) -> Array:
+    def _steps(self, q: Array, held: Flags) -> Array:
         """Return a step of each configuration (K, n)."""
-        bases = null_space(self._follows.jacobians(q))
+        moved = np.flatnonzero(~held)
+        bases = np.zeros((*q.shape, len(moved) - self._follows.dimension))
+        bases[:, moved] = null_space(self._follows.jacobians(q)[:, :, moved])
         each = self._lacks(q)
         lacks, slopes = (np.concatenate(parts, axis=1) for parts in zip(*each, strict=True))
         steps = np.zeros_like(q)

@@ -98,11 +98,14 @@ def _layers(
 
     def free(q: Array, i: int) -> Array:
         selected = q[bounds.keep(q)]
-        # Where bodies leave little room, samples miss it.
-        found = selected if len(selected) else pushing.free(q, lambda x: waypoints.project(x, i))
-        return in_order(found)
+        # Where bodies leave little room, samples miss it; no chain passes one without any.
+        if not len(selected) and all(map(len, layers)):
+            selected = pushing.free(q, lambda x: waypoints.project(x, i), waypoints.held(i))
+        return in_order(selected)
 
-    layers, cost = [free(smooth[0], 0)], np.empty(0)
+    layers = list[Array]()
+    layers.append(free(smooth[0], 0))
+    cost = np.empty(0)
     for i in range(1, waypoints.count):
         progress("search: sampling waypoint", i + 1, waypoints.count)
         before = layers[-1]

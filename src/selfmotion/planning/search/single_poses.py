@@ -213,16 +213,15 @@ def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
 
 def pushed(poses: SinglePoses, t: float, q: Array) -> Array:
     """Return free configurations at t [s] that are reached from others there (K, n), (K', n)."""
-    return Pushing(poses.follows, poses.bounds).free(q, lambda x: poses.project(x, t))
+    pushing = Pushing(poses.follows, poses.bounds)
+    return pushing.free(q, lambda x: poses.project(x, t), poses._held(t))
 
 
 def inside(poses: SinglePoses) -> SinglePoses:
     """Return the same with limits that are a little narrower."""
     lower, upper = poses.bounds.lower, poses.bounds.upper
-    within = np.full(len(lower), AT_LIMIT)
-    n = poses.problem.robot.dof
-    # Those of tolerances are in units of their own.
-    within[n:] = AT_LIMIT * np.minimum(upper[n:], 1.0)
+    # Of a narrow range, as of a tolerance in its own unit, a share.
+    within = AT_LIMIT * np.minimum(0.5 * (upper - lower), 1.0)
     return poses.with_limits(lower + within, upper - within)
 
 
