@@ -269,6 +269,18 @@ def test_a_job_keeps_each_of_several_clearances(tmp_path: Path) -> None:
     assert "what the job is kept clear of is another" in str(other.kept)
 
 
+def test_bodies_of_one_name_are_refused_before_anything_is_planned() -> None:
+    """Of two clearances in two places; and one that a seam leaves, and a clearance has."""
+    post, other = (sm.obstacles.Box("post", [0.0, y, 0.6], [0.1, 0.1, 0.1]) for y in (-0.6, 0.8))
+    near, far = sm.constraints.Clearance([post], 0.01), sm.constraints.Clearance([other], 0.02)
+    robot = robot_named("panda")
+    with pytest.raises(sm.errors.ProblemError, match="two different bodies are called 'post'"):
+        sm.plan_job(robot, SEAMS, clearance=[near, far], **ASKED)
+    leaving = [replace(SEAMS[0], leaves=[other]), SEAMS[1]]
+    with pytest.raises(sm.errors.ProblemError, match="'post' is an obstacle of the clearance"):
+        sm.plan_job(robot, leaving, clearance=near, **ASKED)
+
+
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])
 def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
     """Its first polynomial begins without acceleration, and so the program is verified."""

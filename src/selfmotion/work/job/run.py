@@ -34,6 +34,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
+from selfmotion.model.collision import Obstacle
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import Deadline
 from selfmotion.planning.result import Move, arm_digest
@@ -277,11 +278,12 @@ def plan_job(
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     listed = as_several(seams, "seams", Seam)
-    _check_names(listed)
+    clearances = as_clearances(clearance)
+    _check_names(listed, clearances)
     settings = JobSettings(
         robot,
         _checked_constraints(constraints),
-        as_clearances(clearance),
+        clearances,
         as_whole(branches, "branches", 1, 1000),
         as_number(move_seconds, "move_seconds", above=0.0),
         as_whole(rng, "rng", 0, 2**63),
@@ -410,7 +412,7 @@ def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint,
     return listed
 
 
-def _check_names(seams: Sequence[Seam]) -> None:
+def _check_names(seams: Sequence[Seam], clearances: Sequence[Clearance]) -> None:
     if not seams:
         raise ProblemError("there are no seams, expected one or more")
     names = [seam.name for seam in seams]
@@ -421,6 +423,17 @@ def _check_names(seams: Sequence[Seam]) -> None:
     again = sorted({name for name in left if left.count(name) > 1})
     if again:
         raise ProblemError(f"'{again[0]}' is left by two seams; give each body its own name")
+    bodies: dict[str, Obstacle] = {}
+    for item in (body for clearance in clearances for body in clearance.obstacles):
+        if item.name in left:
+            raise ProblemError(
+                f"'{item.name}' is an obstacle of the clearance, and left by a seam; give each "
+                f"body its own name"
+            )
+        if bodies.setdefault(item.name, item).to_dict() != item.to_dict():
+            raise ProblemError(
+                f"clearance: two different bodies are called '{item.name}'; give each its own name"
+            )
     for seam in seams:
         for name in seam.may_meet:
             if name not in left:
