@@ -91,13 +91,12 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
     if len(starts) > finalists and is_on_nodes(planner.formulation, planner.effort):
         ranking = _ranking(planner)
         if ranking.run(starts, finalists):
-            ranked = ranking.ranked
-            _optimise_motions(planner, ranked)
+            ranked = _trajectories(ranking.ranked)
+            _optimise_near(planner, ranked)
             if planner.is_unmet and planner.incumbent is not None and not planner.is_over:
-                before = [motion.trajectory for motion in ranked]
-                before.append(planner.incumbent.evaluation.trajectory)
+                before = [*ranked, planner.incumbent.evaluation.trajectory]
                 others = ranking.left_aside(before, finalists)
-                _optimise_motions(planner, others)
+                _optimise_near(planner, _trajectories(others))
             return
     elif len(starts) > finalists:
         starts = _best(planner.formulation, starts)[:finalists]
@@ -128,11 +127,10 @@ def optimise_where_it_breaks(
         starts = _drawn(formulation, planner, count, float(t[at]))
     except InverseKinematicsError:
         return
-    known = _pushed(planner, starts, t, at)[:finalists]
-    _optimise_each(planner, _guesses(planner, known), len(known))
+    _optimise_near(planner, _pushed(planner, starts, t, at)[:finalists])
     ranking = _ranking(planner)
     if ranking.run(starts, finalists, at):
-        _optimise_motions(planner, ranking.ranked)
+        _optimise_near(planner, _trajectories(ranking.ranked))
 
 
 def _pushed(planner: Planner, starts: abc.Sequence[Array], t: Array, at: int) -> list[Trajectory]:
@@ -187,8 +185,7 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
     if len(found):
         ranking = _ranking(planner)
         ranking.run_along(found, t, finalists)
-        ranked = ranking.ranked
-        _optimise_motions(planner, ranked)
+        _optimise_near(planner, _trajectories(ranking.ranked))
     return bool(len(found))
 
 
@@ -277,19 +274,18 @@ def _optimise_each(planner: Planner, guesses: Iterable[Guess], count: int) -> No
     planner.waiting = ()
 
 
-def _optimise_motions(planner: Planner, rough: abc.Sequence[NodeMotion]) -> None:
-    known = [motion.trajectory for motion in rough]
-    _optimise_each(planner, _guesses(planner, known), len(known))
+def _optimise_near(planner: Planner, known: abc.Sequence[Trajectory]) -> None:
+    """Optimise from motions that are known, in turn; guesses are made when it is their turn."""
+    started = (
+        planner.guess(motion.q[0], free=planner.setup.is_free, motion=motion)
+        for motion in known
+        if not planner.is_over
+    )
+    _optimise_each(planner, (guess for guess in started if guess is not None), len(known))
 
 
-def _guesses(planner: Planner, motions: abc.Sequence[Trajectory]) -> Iterator[Guess]:
-    """Yield guesses near motions that are known, lazily."""
-    for known in motions:
-        if planner.is_over:
-            continue
-        guess = planner.guess(known.q[0], free=planner.setup.is_free, motion=known)
-        if guess is not None:
-            yield guess
+def _trajectories(rough: abc.Sequence[NodeMotion]) -> list[Trajectory]:
+    return [motion.trajectory for motion in rough]
 
 
 def optimise_sequences(planner: Planner, *, chosen: bool) -> None:

@@ -15,6 +15,7 @@ from selfmotion.model.motion import (
     Trajectory,
 )
 from selfmotion.model.robot import null_space
+from selfmotion.planning import paper
 from selfmotion.planning.formulation import (
     BoundConditions,
     Formulation,
@@ -22,7 +23,7 @@ from selfmotion.planning.formulation import (
     sampled,
 )
 from selfmotion.planning.optimise import Optimizer, Status
-from selfmotion.planning.paper import Method, Objective, Solution as Optimum
+from selfmotion.planning.paper import Method, Objective
 from selfmotion.planning.planner.guess import Guess, pace_of
 from selfmotion.planning.planner.outcomes import OutcomeFacts
 from selfmotion.planning.planner.solution import Solution
@@ -31,7 +32,7 @@ from selfmotion.problem.costs import Samples
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedOutcome(Optimum):
+class PublishedOutcome(paper.Solution):
     """A motion of the published method, optimised.
 
     Attributes

@@ -1,5 +1,7 @@
 """Newton's method onto the self-motions of many poses at once, and along a path's waypoints."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, RobotError, called, inlined, kernel
@@ -351,6 +353,23 @@ class Manifold:
                         f"{name}: compiled kinematics put '{item.chain.tip_name}' "
                         f"{distance:.3g} off where Pinocchio does; this is an error of selfmotion's"
                     )
+
+
+def carry(
+    starts: Array, count: int, at: int, follow: Callable[[Array, int, int], tuple[Array, Flags]]
+) -> tuple[Array, Flags]:
+    """Return motions through configurations (K, n) at `count` times, (K, N, n), and which arrive.
+
+    From time number `at` to both ends: ``follow(q, before, k)`` puts configurations of time number
+    `before` onto the path at the next one, k, and returns where that is possible.
+    """
+    motions, going = np.empty((len(starts), count, starts.shape[1])), np.ones(len(starts), bool)
+    motions[:, at] = starts
+    for step, order in ((1, range(at + 1, count)), (-1, range(at - 1, -1, -1))):
+        for k in order:
+            motions[:, k], arrived = follow(motions[:, k - step], k - step, k)
+            going &= arrived
+    return motions, going
 
 
 class OnPath:

@@ -74,9 +74,11 @@ class Pushing:
     def _nearly_free(self, q: Array) -> Array:
         """Return those that meet least, of some that are spread over all, (K', n)."""
         some = q[:: -(-len(q) // _JUDGED)]
-        missing = np.concatenate([lack for lack, _ in self._lacks(some)], axis=1)
-        worst = missing.max(axis=1, initial=0.0)
-        return np.asarray(some[np.argsort(worst, kind="stable")[:_MOST]])
+        rooms = [
+            (model.clearances(some[:, : model.robot.dof]).values - far).min(axis=1, initial=np.inf)
+            for model, far in self._models
+        ]
+        return np.asarray(some[np.argsort(-np.min(rooms, axis=0), kind="stable")[:_MOST]])
 
     def _lacks(self, q: Array) -> list[tuple[Array, Array]]:
         """Return of each model what is missing of distances (K, P) [m], and their slopes."""

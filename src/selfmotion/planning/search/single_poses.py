@@ -10,7 +10,7 @@ from selfmotion.model.collision import Closest
 from selfmotion.model.follow import band_limits, within_limits
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING, SelfMotion
-from selfmotion.planning.search.manifold import Manifold
+from selfmotion.planning.search.manifold import Manifold, carry
 from selfmotion.planning.search.pushing import Pushing
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
 from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
@@ -231,12 +231,7 @@ def carried_within(poses: SinglePoses, q: Array, t: Array, at: int) -> Array:
     From each of the times t (N,) [s] to the next, and back, within the limits: (K', N, n), of those
     for which that is possible.
     """
-    motions, going = np.empty((len(q), len(t), q.shape[1])), np.ones(len(q), dtype=bool)
-    motions[:, at] = q
-    for step, order in ((1, range(at + 1, len(t))), (-1, range(at - 1, -1, -1))):
-        for k in order:
-            motions[:, k], arrived = poses.project(motions[:, k - step], float(t[k]))
-            going &= arrived
+    motions, going = carry(q, len(t), at, lambda x, _, k: poses.project(x, float(t[k])))
     return np.asarray(motions[going])
 
 

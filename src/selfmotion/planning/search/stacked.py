@@ -18,7 +18,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Quantity
 from selfmotion.model.follow import Coordinates, Follows
-from selfmotion.planning.search.manifold import Manifold
+from selfmotion.planning.search.manifold import Manifold, carry
 
 # Share of its limit from which on a row binds …
 _SHARE = 0.9
@@ -82,18 +82,13 @@ class Stacked:
         """
         follows = self._follows
         targets, helds = follows.targets(t), follows.held(t)
-        motions = np.empty((len(starts), len(t), starts.shape[1]))
-        going = np.ones(len(starts), dtype=np.bool_)
-        motions[:, at] = starts
-        for step, order in ((1, range(at + 1, len(t))), (-1, range(at - 1, -1, -1))):
-            for k in order:
-                before = motions[:, k - step]
-                seconds = t[k] - t[k - step]
-                twist = follows.twists(np.array([0.5 * (t[k] + t[k - step])]))[0]
-                ahead = before + self._step(before, seconds * twist)
-                motions[:, k], arrived = self._satisfied(ahead, targets[k], helds[k], _NEAR_ROUNDS)
-                going &= arrived
-        return motions, going
+
+        def follow(q: Array, before: int, k: int) -> tuple[Array, Flags]:
+            twist = follows.twists(np.array([0.5 * (t[k] + t[before])]))[0]
+            ahead = q + self._step(q, (t[k] - t[before]) * twist)
+            return self._satisfied(ahead, targets[k], helds[k], _NEAR_ROUNDS)
+
+        return carry(starts, len(t), at, follow)
 
     def _satisfied(self, q: Array, target: Array, held: Flags, rounds: int) -> tuple[Array, Flags]:
         """Return configurations near others that are on the path and keep everything, and which."""

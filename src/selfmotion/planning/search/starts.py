@@ -9,7 +9,7 @@ from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.model.follow import Coordinates, Follows, has_windows, is_plain, only_tip, tip_names
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
-from selfmotion.planning.search.manifold import Manifold
+from selfmotion.planning.search.manifold import Manifold, carry
 from selfmotion.planning.search.vertices import Admissible
 
 # Seeds where all self-motions of the first pose can be traced.
@@ -168,18 +168,7 @@ def carried(
     free = np.full(follows.dof, np.inf)
     manifold = Manifold(follows, -free, free)
     targets, helds = follows.targets(t), follows.held(t)
-    motions, going = (
-        np.empty((len(starts), len(t), starts.shape[1])),
-        np.ones(len(starts), dtype=bool),
-    )
-    motions[:, at] = starts
-    for step, order in ((1, range(at + 1, len(t))), (-1, range(at - 1, -1, -1))):
-        for k in order:
-            motions[:, k], arrived = manifold.project(
-                motions[:, k - step], targets[k], held=helds[k]
-            )
-            going &= arrived
-    return motions, going
+    return carry(starts, len(t), at, lambda q, _, k: manifold.project(q, targets[k], held=helds[k]))
 
 
 def spread(coordinates: Coordinates, count: int, rng: np.random.Generator) -> Array:

@@ -45,6 +45,8 @@ class CollisionChecks:
 
     def is_near(self, q: Array, *bodies: Obstacle) -> bool:
         """Whether the arm at q (n,) is nearer to one of the bodies than the clearance allows."""
+        if not bodies:
+            return False
         clearance = self._settings.clearance_from(bodies)
         return clearance.model(self._settings.robot).distance(q).value < clearance.distance
 

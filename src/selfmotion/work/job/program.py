@@ -215,12 +215,12 @@ class Program:
     def _unchecked(self) -> Iterator[str]:
         """Yield steps that are not checked against an obstacle that is there by then."""
         specification = self.specification
-        asked: tuple[Clearance | None, ...] = (None,)
+        clearances: tuple[Clearance | None, ...] = (None,)
         if specification is not None:
-            asked = specification.clearances or (Clearance(distance=0.0),)
+            clearances = specification.clearances or (Clearance(distance=0.0),)
         each = [
             (clearance, {} if clearance is None else {x.name: x for x in clearance.obstacles})
-            for clearance in asked
+            for clearance in clearances
         ]
         for step in self.steps:
             named = (name for one, bodies in each for name in step.unchecked(bodies, one))
