@@ -281,6 +281,27 @@ def test_bodies_of_one_name_are_refused_before_anything_is_planned() -> None:
         sm.plan_job(robot, leaving, clearance=near, **ASKED)
 
 
+def test_what_is_left_behind_takes_no_obstacles_place() -> None:
+    """A file may say so: the obstacle would be there, and no later step be checked against it."""
+    post, other, far = (
+        sm.obstacles.Box(name, place, [0.1, 0.1, 0.1])
+        for name, place in (
+            ("post", [0.0, -0.6, 0.6]), ("other", [0.0, 0.0, 3.0]), ("post", [0.0, 0.0, 3.0]),
+        )
+    )  # fmt: skip
+    leaving = replace(SEAMS[0], leaves=[other])
+    clear = sm.constraints.Clearance([post], 0.01)
+    made = sm.plan_job(robot_named("panda"), [leaving], clearance=clear, **ASKED).require()
+    renamed = replace(leaving, leaves=[far])
+    *before, last = (replace(step, leaves=(far,) if step.leaves else ()) for step in made.steps)
+    others = [item for item in last.constraints if not isinstance(item, type(clear))]
+    elsewhere = (*others, sm.constraints.Clearance([far], 0.01))
+    steps = (*before, replace(last, made=replace(last.made, constraints=elsewhere)))
+    wanted = replace(made.specification, seams=(renamed,))
+    verdict = replace(made, steps=steps, specification=wanted).verdict
+    assert "'one' leaves 'post', and another body has this name" in verdict
+
+
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])
 def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
     """Its first polynomial begins without acceleration, and so the program is verified."""

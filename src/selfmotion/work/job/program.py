@@ -24,7 +24,7 @@ from selfmotion.planning.result import (
 )
 from selfmotion.problem.constraints import Clearance
 from selfmotion.work.job.program_files import write_program
-from selfmotion.work.job.seam import Step
+from selfmotion.work.job.seam import Step, same_body
 from selfmotion.work.job.specification import Specification
 
 # Events may be outside their step by rounding [s].
@@ -227,6 +227,10 @@ class Program:
             unchecked = next(named, None)
             if unchecked is not None:
                 yield f"'{step.name}' is not checked against '{unchecked}', which is there by then"
+            for item in step.leaves:
+                if any(not same_body(bodies.get(item.name, item), item) for _, bodies in each):
+                    # It would take the place of that one, which nothing is checked against then.
+                    yield f"'{step.name}' leaves '{item.name}', and another body has this name"
             # What is left behind is kept clear of as the first clearance says.
             each[0][1].update((item.name, item) for item in step.leaves)
 

@@ -99,7 +99,7 @@ class Step:
         return [
             name
             for name, item in obstacles.items()
-            if name not in self.may_meet and not _same(known.get(name), item)
+            if name not in self.may_meet and not same_body(known.get(name), item)
         ]
 
     def _bodies_kept_clear_of(self, clearance: Clearance) -> tuple[Obstacle, ...]:
@@ -108,7 +108,7 @@ class Step:
         return tuple(body for item in far for body in item.obstacles)
 
 
-def _same(one: Obstacle | None, other: Obstacle) -> bool:
+def same_body(one: Obstacle | None, other: Obstacle) -> bool:
     """Whether two bodies are one, and in the same place."""
     return one is other or (one is not None and one.to_dict() == other.to_dict())
 
