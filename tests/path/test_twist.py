@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from support.paths import pose
 
 
@@ -28,3 +29,18 @@ def test_twist_path_refuses_a_jump() -> None:
         sm.paths.TwistPath(pose(1), lambda t: [float(t > 0.7), 0, 0], 1.0)
     with pytest.raises(sm.errors.PathError, match="expected"):
         sm.paths.TwistPath(pose(1), lambda t: [1.0, 2.0], 1.0)
+
+
+def test_a_function_may_fill_one_array_again_and_again() -> None:
+    kept = np.zeros(6)
+
+    def velocity(t: float) -> Array:
+        kept[0], kept[5] = np.sin(t), t
+        return kept
+
+    def anew(t: float) -> Array:
+        return np.array([np.sin(t), 0.0, 0.0, 0.0, 0.0, t])
+
+    one, other = (sm.paths.TwistPath(pose(1), each, 2.0) for each in (velocity, anew))
+    for t in np.linspace(0.0, 2.0, 7):
+        np.testing.assert_array_equal(one.pose(t).translation, other.pose(t).translation)

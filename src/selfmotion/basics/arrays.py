@@ -115,10 +115,10 @@ def as_numbers(
         if array is None and is_ragged(values):
             found = ", whose rows have different lengths"
         raise error(f"{what} is {shown(values)}{found}, expected {expected}")
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        where = f"[{', '.join(map(str, bad[0]))}]" if array.ndim else ""
-        raise error(f"{what}{where} is {array[tuple(bad[0])]}, expected {expected}")
+    if not np.isfinite(array).all():
+        bad = np.argwhere(~np.isfinite(array))[0]
+        where = f"[{', '.join(map(str, bad))}]" if array.ndim else ""
+        raise error(f"{what}{where} is {array[tuple(bad)]}, expected {expected}")
     return read_only(array)
 
 

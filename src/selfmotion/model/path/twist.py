@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from numpy.polynomial import chebyshev
 from typing_extensions import override
 
-from selfmotion.basics import Array, PathError, as_numbers, series, shown
+from selfmotion.basics import Array, PathError, as_numbers, plain_numbers, series, shown
 from selfmotion.model.path.base import Path, PathSamples, PathSeries, check_duration, path_pose
 from selfmotion.model.task import SE3, Quaternion
 
@@ -227,13 +228,13 @@ def _resolve(
     velocity: Callable[[float], npt.ArrayLike], duration: float
 ) -> tuple[list[float], list[Array]]:
     """Return breaks and Chebyshev coefficients of pieces that resolve the velocity."""
-    scale = max(float(np.abs(_sample(velocity, t)).max()) for t in np.linspace(0, duration, 9))
+    scale = float(np.abs(_samples(velocity, np.linspace(0.0, duration, 9))).max())
     pending, breaks, segments = [(0.0, duration)], [0.0], []
     nodes = chebyshev.chebpts1(_DEGREE + 1)
     while pending:
         left, right = pending.pop()
         times = 0.5 * (left + right) + 0.5 * (right - left) * nodes
-        values = np.array([_sample(velocity, t) for t in times])
+        values = _samples(velocity, times)
         coefficients = chebyshev.chebfit(nodes, values, _DEGREE)
         scale = max(scale, float(np.abs(values).max()))
         resolved = np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300)
@@ -264,7 +265,7 @@ def _fits(
     """Return whether a segment equals the velocity between its nodes."""
     count = max(_BESIDES, int(np.ceil(_IN_ALL * (right - left) / duration)))
     s = np.linspace(-1.0, 1.0, count + 1)[:-1] + 1.0 / count
-    values = np.array([_sample(velocity, t) for t in 0.5 * (left + right + (right - left) * s)])
+    values = _samples(velocity, 0.5 * (left + right + (right - left) * s))
     difference = np.abs(chebyshev.chebval(s, coefficients).T - values).max()
     return bool(difference <= _DIFFERENCE * max(scale, 1e-300))
 
@@ -286,7 +287,8 @@ def _check_ends(
 ) -> None:
     """Refuse a velocity that jumps next to an end, beyond all samples."""
     for time, place, segment in ((0.0, -1.0, segments[0]), (duration, 1.0, segments[-1])):
-        jump = float(np.abs(chebyshev.chebval(place, segment) - _sample(velocity, time)).max())
+        at_end = _samples(velocity, np.array([time]))[0]
+        jump = float(np.abs(chebyshev.chebval(place, segment) - at_end).max())
         if not jump <= _JUMP * max(scale, 1e-300):
             raise PathError(
                 f"twist path: the velocity jumps by {jump:.3g} m/s or rad/s next to t = "
@@ -294,9 +296,21 @@ def _check_ends(
             )
 
 
-def _sample(velocity: Callable[[float], npt.ArrayLike], t: float) -> Array:
+def _samples(velocity: Callable[[float], npt.ArrayLike], times: Array) -> Array:
+    """Return the velocity at times (K,) as rows (K, 6)."""
+    # Of a copy, as a function may return the same array each time.
+    given = [copy(velocity(t)) for t in times.tolist()]
+    # Thousands of samples are checked at once; one of several kinds, or a bad one, by itself.
+    values = plain_numbers(given)
+    if values is not None and values.shape == (len(times), 6) and np.isfinite(values).all():
+        return values
+    return np.array([_as_twist(value, t) for value, t in zip(given, times, strict=True)])
+
+
+def _as_twist(given: npt.ArrayLike, t: float) -> Array:
+    """Return what the velocity is at a time as a twist (6,)."""
     what, expected = f"twist path: velocity({t:.6g})", "[v, ω] (6,) or [v] (3,), finite"
-    value = as_numbers(velocity(float(t)), what, expected, error=PathError)
+    value = as_numbers(given, what, expected, error=PathError)
     if value.shape == (3,):
         value = np.concatenate([value, np.zeros(3)])
     return as_numbers(value, what, expected, (6,), PathError)
