@@ -14,21 +14,22 @@ help:  ## this list
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
-# The site runs every example, a browser draws every arm and drags on pages: a target of its own,
-# with other tests that take as long.
-TWO := --numprocesses 2 -m 'not site'
+# What takes long, as the site, which runs every example, or is seen in a browser, is a target of its
+# own: `site`.
+TWO := --numprocesses 2
+BY_FILE := --dist loadfile --no-loadscope-reorder
 
 test: $(READY)  ## all tests but those of `test-site`, on two cores
-	$(BIN)/pytest $(TWO) --dist loadfile --no-loadscope-reorder --keep-durations
+	$(BIN)/pytest $(TWO) $(BY_FILE) -m 'not site' --keep-durations
 
 test-site: $(READY)  ## long tests: the site, pages in a browser, the study of the paper
-	$(BIN)/pytest -m site tests/docs tests/replay tests/study tests/view tests/whole
+	$(BIN)/pytest $(TWO) $(BY_FILE) -m site
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync lint quick
 
 quick: $(READY)
-	$(BIN)/pytest $(TWO) --dist worksteal --below 0.1 --arms few
+	$(BIN)/pytest $(TWO) --dist worksteal -m 'not site' --below 0.1 --arms few
 
 # What plans, and what is computed with it: the rest reads and writes files and pages.
 PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
@@ -36,8 +37,7 @@ PLANNING := $(addprefix tests/, baselines batch certificate collision constraint
 	robot rollout search task transfer)
 
 test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
-	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest --numprocesses 2 --dist loadfile \
-		--no-loadscope-reorder $(PLANNING)
+	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest $(TWO) $(BY_FILE) $(PLANNING)
 
 lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff check .

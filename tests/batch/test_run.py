@@ -106,6 +106,7 @@ def test_two_processes_and_threads_give_the_same(
         same(plan_items(grid_items(grid), threads, out=tmp_path / "threads"), reference)
 
 
+@pytest.mark.site
 def test_a_dask_cluster_gives_the_same(reference: sm.Batch, grid: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     cluster = distributed.LocalCluster(
@@ -403,6 +404,7 @@ def test_of_each_file_some_combination_has_to_be_verified() -> None:
     assert not is_answered([one], set())
 
 
+@pytest.mark.site
 def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> None:
     """In one that has its bodies made before as well; so is what a row lies about."""
     panda = robot_named("panda")

@@ -170,6 +170,7 @@ def test_a_seam_that_cannot_begin_there_is_planned_like_any_other(program, monke
     assert set(again.order) == set(program.order)
 
 
+@pytest.mark.site
 def test_where_no_program_comes_of_it_all_is_planned_anew(program, monkeypatch) -> None:
     panda = robot_named("panda")
     cold = sm.plan_job(panda, seams(0.02), start=HOME, end=HOME, branches=1)

@@ -269,6 +269,22 @@ def test_a_job_keeps_each_of_several_clearances(tmp_path: Path) -> None:
     assert "what the job is kept clear of is another" in str(other.kept)
 
 
+@pytest.mark.parametrize("pair", [(), (("panda_hand", "panda_link5"),)])
+def test_a_clearance_of_a_seam_comes_beside_that_of_the_job(pair: tuple[tuple[str, str]]) -> None:
+    """Also where it leaves out a pair: the job's holds for all pairs. Else one judges both."""
+    post = sm.obstacles.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 0.1])
+    own = sm.constraints.Clearance([post], 0.01, disabled=pair)
+    seams = [replace(SEAMS[0], constraints=[own]), SEAMS[1]]
+    made = sm.plan_job(robot_named("panda"), seams, **ASKED).require()
+    assert len(made.plans["one"].problem.clearances) == (2 if pair else 1)
+    alone = replace(made.plans["one"].problem, clearance=own)
+    steps = [
+        replace(step, made=replace(step.made, problem=alone)) if step.name == "one" else step
+        for step in made.steps
+    ]
+    assert replace(made, steps=tuple(steps)).verified == (not pair)
+
+
 def test_bodies_of_one_name_are_refused_before_anything_is_planned() -> None:
     """Of two clearances in two places; and one that a seam leaves, and a clearance has."""
     post, other = (sm.obstacles.Box("post", [0.0, y, 0.6], [0.1, 0.1, 0.1]) for y in (-0.6, 0.8))

@@ -121,6 +121,7 @@ def test_corrections_from_the_shell(plan: sm.Plan, tmp_path) -> None:  # type: i
     assert '"corrected"' in told
 
 
+@pytest.mark.site
 def test_where_the_base_carries_the_path_the_part_is_corrected(tmp_path) -> None:  # type: ignore[no-untyped-def]
     arm = sm.load_robot("panda", reference="panda_link0")
     pose = arm.pose(sm.NAMED_ARMS["panda"].home)

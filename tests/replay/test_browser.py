@@ -19,6 +19,8 @@ from selfmotion.shop.controllers import read_motion
 from support.layouts import chromium
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
 
+pytestmark = pytest.mark.site
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -390,7 +392,6 @@ def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
     assert_quiet(page)
 
 
-@pytest.mark.site
 @pytest.mark.parametrize("name", sorted(NAMED_ARMS))
 def test_every_named_arm_is_drawn(open_page, pages, tmp_path, name):
     plan = planar_plan() if name == "planar_3r" else arm_plan(name)

@@ -169,6 +169,7 @@ def test_the_planar_arm_is_as_the_law_of_cosines_has_it():
         assert np.abs((off + np.pi) % (2.0 * np.pi) - np.pi).max() < 1e-6
 
 
+@pytest.mark.site
 def test_a_panda_is_as_brute_force_has_it():
     plan = circle(post=True)
     shown = plan.redundancy_map(shape=(21, 61))

@@ -24,6 +24,7 @@ COUNT, EVALUATIONS, PER_INTERVAL = 120, 3, 40
     phases=[hypothesis.Phase.explicit, hypothesis.Phase.generate],
     suppress_health_check=list(hypothesis.HealthCheck),
 )
+@pytest.mark.site
 @hypothesis.given(problems(most_joints=6))
 def test_generated_problems_end_well(words: Generated) -> None:
     end = end_of(words, max_evaluations=EVALUATIONS, per_interval=PER_INTERVAL)

@@ -252,6 +252,7 @@ def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> N
     assert "search" in found(search=sm.Search(starts=3))
 
 
+@pytest.mark.site
 def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
     down = np.diag([1.0, -1.0, -1.0])
 

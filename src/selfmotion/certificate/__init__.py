@@ -19,6 +19,7 @@ from selfmotion.certificate.limits import (
     EndState as EndState,
     JointLimits as JointLimits,
     arm_limits as arm_limits,
+    limits_of_joints as limits_of_joints,
 )
 from selfmotion.certificate.path_error import (
     deviation_from as deviation_from,

@@ -123,12 +123,20 @@ class JointLimits(Requirement):
         return Finding(self.name, name, time, float(shares[joint]), 1.0, False, text, True, np.inf)
 
 
+def limits_of_joints(
+    requirements: Sequence[Requirement], order: int | None = None
+) -> tuple[JointLimits, ...]:
+    """Return the limits of joints among requirements, of one order of derivatives or of all."""
+    limits = (item for item in requirements if isinstance(item, JointLimits))
+    return tuple(item for item in limits if order is None or item.order == order)
+
+
 def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[JointLimits, ...]:
     """Return the arm's own limits of position and velocity, but for orders that others speak of.
 
     Limits of one's own contain the arm's, or are meant to replace them.
     """
-    taken = {item.order for item in requirements if isinstance(item, JointLimits)}
+    taken = {item.order for item in limits_of_joints(requirements)}
     own = (
         JointLimits(0, robot.lower, robot.upper),
         JointLimits(1, -robot.velocity_limit, robot.velocity_limit),

@@ -235,7 +235,7 @@ def _resolve(
         left, right = pending.pop()
         times = 0.5 * (left + right) + 0.5 * (right - left) * nodes
         values = _samples(velocity, times)
-        coefficients = chebyshev.chebfit(nodes, values, _DEGREE)
+        coefficients = np.asarray(chebyshev.chebfit(nodes, values, _DEGREE), dtype=np.float64)
         scale = max(scale, float(np.abs(values).max()))
         resolved = np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300)
         if resolved and _fits(velocity, left, right, coefficients, duration, scale):

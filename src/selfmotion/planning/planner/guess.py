@@ -13,7 +13,12 @@ from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, most_nodes
 from selfmotion.planning.planner.outcomes import MinimumNormOutcome
 from selfmotion.planning.result import Plan
-from selfmotion.planning.rollout import Guide, MinimumNormMotion, converged_minimum_norm
+from selfmotion.planning.rollout import (
+    MOST_HALVINGS,
+    Guide,
+    MinimumNormMotion,
+    converged_minimum_norm,
+)
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 
@@ -150,6 +155,11 @@ class Guess:
     def conditions(self) -> BoundConditions:
         """Conditions on the motion, bound to the ends of the minimum-norm motion."""
         return self.minimum_norm.conditions
+
+    @property
+    def most_steps(self) -> int:
+        """Number of steps above which a grid is not refined any more."""
+        return int(self.minimum_norm.motion.grid.steps * 2**MOST_HALVINGS)
 
     def near(self, motion: Trajectory) -> "Guess":
         """Return it with a motion that is known, in place of the minimum-norm one."""

@@ -12,7 +12,7 @@ from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.largest_part import Part
 from selfmotion.planning.planner.refinement import refined
 from selfmotion.planning.planner.solution import Solution, have_one_start
-from selfmotion.planning.planner.solve import kept_off_itself, settle, solve_again
+from selfmotion.planning.planner.solve import kept_off_itself, settle, solve
 from selfmotion.planning.rollout import MOST_HALVINGS
 
 # Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
@@ -111,7 +111,7 @@ class _ByCertificate:
             return None
         solution = part.solution.refined()
         if rough and not solution.cut_short:
-            solution = solve_again(solution)
+            solution = solve(solution)
         self.part = replace(part, solution=solution)
         return self.part
 
@@ -136,7 +136,7 @@ class _ByCertificate:
         misses.append(check.position_error.value + check.rotation_error.value)
         if self._coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
             return True
-        return solution.outcome.steps >= solution.most_steps
+        return solution.outcome.steps >= solution.guess.most_steps
 
 
 class _ByPath:
@@ -163,7 +163,7 @@ class _ByPath:
         errors = path_errors(self._formulation, motion.trajectory) / self._allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < _FALLS * self._worst or len(errors) > solution.most_steps
+        stuck = not worst < _FALLS * self._worst or len(errors) > solution.guess.most_steps
         if motion.damped or worst <= _RESOLVED or stuck:
             return None
         self._worst = worst

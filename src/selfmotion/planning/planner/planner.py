@@ -16,7 +16,7 @@ from selfmotion.planning.planner.judging import Judged
 from selfmotion.planning.planner.screening import Ranking
 from selfmotion.planning.planner.setup import Setup
 from selfmotion.planning.planner.solution import Solution
-from selfmotion.planning.planner.solve import solve_again
+from selfmotion.planning.planner.solve import solve
 from selfmotion.planning.result import Attempt
 from selfmotion.planning.rollout import Guide
 from selfmotion.planning.search import Obstruction, Reach, Sequence, reachable
@@ -131,14 +131,14 @@ class Planner:
 
     def take(self, given: Guess | Solution, *, chosen: bool = True) -> Solution:
         """Optimise from a guess, or a solution; keep it if it is the best and may be chosen."""
-        begun = Solution.of(given) if isinstance(given, Guess) else given
         best, cost_to_beat = self.incumbent, np.inf
         # Comparisons are optimised to the end.
         if chosen and best is not None and best.will_do:
             cost_to_beat = best.outcome.cost
         try:
-            found = solve_again(begun, cost_to_beat)
+            found = solve(given, cost_to_beat)
         except KeyboardInterrupt:
+            begun = Solution.of(given) if isinstance(given, Guess) else given
             found = begun.ended_by(Status.INTERRUPTED)
         if found.is_hopeless:
             return found

@@ -7,7 +7,6 @@ from selfmotion.model.motion import Evaluation
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.outcomes import NodeOutcome, Outcome
-from selfmotion.planning.rollout import MOST_HALVINGS
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +65,6 @@ class Solution:
     def will_do(self) -> bool:
         """Whether the motion keeps all constraints, and keeps the arm off itself."""
         return not self.violations and self.outcome.keeps_off_itself
-
-    @property
-    def most_steps(self) -> int:
-        """Number of steps above which a grid is not refined any more."""
-        return int(self.guess.minimum_norm.motion.grid.steps * 2**MOST_HALVINGS)
 
     def ended_by(self, status: Status) -> "Solution":
         """Return the motion as it is; there is no time for another one."""

@@ -22,8 +22,8 @@ from selfmotion.planning.planner.solution import Solution, is_chain
 _Search = Callable[[LocalSearch], NodeOutcome | None]
 
 
-def solve(guess: Guess, cost_to_beat: float = np.inf) -> Solution:
-    """Return the optimum near an initial guess, on few nodes.
+def solve(begun: Guess | Solution, cost_to_beat: float = np.inf) -> Solution:
+    """Return the optimum near an initial guess, on few nodes, or near a solution, on its own.
 
     Where a motion is known that costs `cost_to_beat`, it ends as soon as it is clear that this one
     will cost more.
@@ -35,11 +35,7 @@ def solve(guess: Guess, cost_to_beat: float = np.inf) -> Solution:
     KeyboardInterrupt
         The interruption came before there was a motion that satisfies all conditions.
     """
-    return solve_again(Solution.of(guess), cost_to_beat)
-
-
-def solve_again(solution: Solution, cost_to_beat: float = np.inf) -> Solution:
-    """Return the optimum near a solution, on its nodes; see `solve`."""
+    solution = Solution.of(begun) if isinstance(begun, Guess) else begun
     guess = solution.guess
     if solution.ended is not None or is_chain(solution):
         return solution

@@ -13,9 +13,9 @@ from selfmotion.certificate import (
     ARRIVED,
     REST_ACCELERATION,
     USUAL,
-    JointLimits,
     Requirement,
     Tolerance,
+    limits_of_joints,
 )
 from selfmotion.model.follow import Follow
 from selfmotion.model.motion import Trajectory
@@ -282,8 +282,8 @@ class CheckedMotion(NamedTuple):
 
 def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple[bool, bool]:
     limited = any(
-        isinstance(item, JointLimits) and item.order > _SMOOTH and np.isfinite(item.upper).any()
-        for item in requirements
+        item.order > _SMOOTH and np.isfinite(item.upper).any()
+        for item in limits_of_joints(requirements)
     )
     if limited:
         # No limited jerk makes a step of acceleration.

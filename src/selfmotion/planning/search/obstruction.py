@@ -69,7 +69,7 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     joint = least_excess(poses, t)
     if joint is not None:
         name, excess = joint
-        unit = poses.problem.robot.unit_of(name)
+        unit = poses.formulation.problem.robot.unit_of(name)
         found.append(f"joint '{name}' going {excess:.3g} {unit} beyond its limit")
     return found
 
@@ -101,7 +101,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     By sampling: the least of many, which is then reduced. None if nothing is found, or the task
     does not prescribe these rows.
     """
-    problem = poses.problem
+    problem = poses.formulation.problem
     prescribed = [ROW_NAMES[k] for k in problem.task.rows]
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
@@ -149,7 +149,7 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     lower, upper = poses.bounds.lower, poses.bounds.upper
     seeds = poses.some(t, CLIMBERS)
     found: list[tuple[float, str]] = []
-    for k, name in enumerate(poses.problem.robot.joint_names):
+    for k, name in enumerate(poses.formulation.problem.robot.joint_names):
         if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
             continue
         wide = poses.with_limits(
@@ -206,7 +206,7 @@ class Obstruction:
     def reason(self) -> str:
         """The cause at that pose, and the extent of the search."""
         poses, found = self.poses, self.found
-        name = poses.problem.robot.tool
+        name = poses.formulation.problem.robot.tool
         if self.is_met:
             return (
                 f"each configuration that was found to put '{name}' there, from {found.tries} "
@@ -214,7 +214,7 @@ class Obstruction:
             )
         q, _ = self._nearest
         position, rotation = self.errors
-        turned = f" and {rotation:.2g} rad" if poses.problem.task.angular else ""
+        turned = f" and {rotation:.2g} rad" if poses.formulation.problem.task.angular else ""
         return (
             f"none was found that puts '{name}' there, from {found.tries} tries"
             f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
@@ -301,11 +301,11 @@ def _worst_first(formulation: Formulation, times: Array) -> list[float]:
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return the cause why the arm reaches no further at q (n,); "" for none found."""
     own, follows, causes = poses.coordinates, poses.follows, []
-    near = np.minimum(q - own.lower, own.upper - q)[: poses.problem.robot.dof] < AT_LIMIT
+    near = np.minimum(q - own.lower, own.upper - q)[: poses.formulation.problem.robot.dof] < AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{own.names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
-    best = own.dexterous(poses.problem.task)
+    best = own.dexterous(poses.formulation.problem.task)
     here, there = (
         float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
     )
@@ -383,13 +383,13 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
     begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
-    if len(poses.problem.follows.items) > 1:
+    if len(poses.formulation.problem.follows.items) > 1:
         names = tip_names(poses.follows)
         return f"{begin}: no configuration was found that puts {names} on their paths"
     rounds = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
     errors = [(*poses.nearest(float(t))[1][0], float(t)) for t in rounds]
     position, rotation, when = max(errors, key=lambda pair: pair[0] + pair[1])
-    turned = f" and {rotation:.2g} rad" if poses.problem.task.angular else ""
+    turned = f" and {rotation:.2g} rad" if poses.formulation.problem.task.angular else ""
     return (
         f"{begin}: the nearest configuration found misses it by up to "
         f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"

@@ -94,11 +94,6 @@ class SinglePoses:
         # Cached: a path takes a millisecond to evaluate.
         self._targets: dict[float, Array] = {}
 
-    @property
-    def problem(self) -> Problem:
-        """The user's problem."""
-        return self.formulation.problem
-
     def of(self, problem: Problem) -> "SinglePoses":
         """Return that of another problem, its path moved as far as this one's."""
         other = SinglePoses(Formulation.of(problem), self._rng, clear=self._clear)

@@ -23,7 +23,7 @@ from selfmotion.basics import (
 from selfmotion.model.path import Feed, Path, Placed, pose_of, with_run_ups
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, separate_clearances
+from selfmotion.problem.constraints import NO_OVERLAP, Clearance, Constraint, as_clearances
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents.problem_file import plan_request_of
 from selfmotion.shell.documents.problem_parts import (
@@ -47,7 +47,14 @@ from selfmotion.shop.cam import (
     read_seams,
     times_of_events,
 )
-from selfmotion.work.job import FASTEST_FEED, Program, Seam, highest_feed, plan_job
+from selfmotion.work.job import (
+    FASTEST_FEED,
+    Program,
+    Seam,
+    highest_feed,
+    plan_job,
+    problem_of_seam,
+)
 
 # Keys of what seams share, of a job, of a seam besides those of a problem, of seams in one table.
 SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "clearance")
@@ -120,19 +127,8 @@ class SeamJob:
         return tuple(map(self._problem, self.seams))
 
     def _problem(self, seam: Seam) -> Problem:
-        every = (*self.settings["constraints"], *seam.constraints)
-        constraints, clearances = separate_clearances(
-            every, self.settings.get("clearance", NO_OVERLAP)
-        )
-        problem = Problem(
-            self.robot,
-            seam.path,
-            seam.task,
-            constraints=constraints,
-            relaxations=tuple(seam.relaxations),
-            clearance=clearances,
-        )
-        return problem if seam.costs is None else replace(problem, costs=tuple(seam.costs))
+        clearances = as_clearances(self.settings.get("clearance", NO_OVERLAP))
+        return problem_of_seam(self.robot, seam, self.settings["constraints"], clearances)
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -200,11 +200,6 @@ def _plan(
     """Return what a page needs of one plan, its traces below the node `root`."""
     shown, replayed = motion.shown, motion.replayed
     obstacles = replayed.obstacles
-    times = (
-        np.linspace(0.0, shown.t[-1], triads)
-        if isinstance(triads, int)
-        else np.atleast_1d(np.asarray(triads, dtype=float))
-    )
     return {
         "label": name,
         "description": replayed.description,
@@ -237,20 +232,30 @@ def _plan(
         "riders": scene.riders(root, motion.plan.robot, obstacles),
         "commands": [
             *scene.obstacle_commands(root, motion.plan.robot, obstacles, payload),
-            *(
-                command
-                for f, tip in enumerate(motion.tips)
-                for command in (
-                    *replayed.trace_commands(
-                        f"{root}/tip{f}", payload, tip, scale, _TRACE_RADIUS * size
-                    ),
-                    scene.triad_command(
-                        f"{root}/tip{f}", payload, tip.shown, times, _TRIAD_LENGTH * size
-                    ),
-                )
-            ),
+            *_tip_commands(motion, root, payload, scale, triads, size),
         ],
     }
+
+
+def _tip_commands(
+    motion: _Motion,
+    root: str,
+    payload: Payload,
+    scale: Json,
+    triads: int | npt.ArrayLike,
+    size: float,
+) -> Iterator[Json]:
+    """Yield the commands that draw the trace and the triads of each tip."""
+    shown = motion.shown
+    times = (
+        np.linspace(0.0, shown.t[-1], triads)
+        if isinstance(triads, int)
+        else np.atleast_1d(np.asarray(triads, dtype=float))
+    )
+    for f, tip in enumerate(motion.tips):
+        node, radius = f"{root}/tip{f}", _TRACE_RADIUS * size
+        yield from motion.replayed.trace_commands(node, payload, tip, scale, radius)
+        yield scene.triad_command(node, payload, tip.shown, times, _TRIAD_LENGTH * size)
 
 
 def _packed(frames: KeyFrames, payload: Payload) -> Json:

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Flags, PlanError, ProblemError
-from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
+from selfmotion.certificate import Requirement, Separation, Tolerance, arm_limits, limits_of_joints
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import REST_SPEED as _REST, FeedProfile, Path
 from selfmotion.model.robot import Chain
@@ -162,9 +162,7 @@ def _move_operation(name: str, move: Move) -> Operation:
 
 def _speeds(requirements: Sequence[Requirement]) -> Array | None:
     """Return the limits of joint speed (n,) among requirements; None for none."""
-    limits = [
-        item.upper for item in requirements if isinstance(item, JointLimits) and item.order == 1
-    ]
+    limits = [item.upper for item in limits_of_joints(requirements, 1)]
     return np.minimum.reduce(limits) if limits else None
 
 

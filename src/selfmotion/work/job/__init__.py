@@ -15,5 +15,6 @@ from selfmotion.work.job.seam import (
     backwards as backwards,
 )
 from selfmotion.work.job.specification import Specification as Specification
+from selfmotion.work.job.work import problem_of_seam as problem_of_seam
 
 __all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

@@ -31,7 +31,12 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import branches, from_start, like_before, near_start
 from selfmotion.planning.result import ArmCache, Move, Plan, load_move, load_plan
 from selfmotion.planning.transfer import FreeMotions, constraints_of_moves
-from selfmotion.problem.constraints import Clearance, Constraint, separate_clearances
+from selfmotion.problem.constraints import (
+    Clearance,
+    Constraint,
+    clearances_among,
+    without_clearances,
+)
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import (
     Problem,
@@ -99,18 +104,8 @@ class JobSettings:
 
     def problem(self, seam: Seam, obstacles: Sequence[Any] = (), turned: bool = False) -> Problem:
         """Return the problem of a seam, with further obstacles."""
-        every = (*self.constraints, *seam.constraints)
-        constraints, clearances = separate_clearances(every, self.clearances_with(obstacles))
-        problem = Problem(
-            self.robot,
-            seam.path,
-            seam.task,
-            constraints=constraints,
-            relaxations=tuple(seam.relaxations),
-            clearance=clearances,
-        )
-        if seam.costs is not None:
-            problem = replace(problem, costs=tuple(seam.costs))
+        clearances = self.clearances_with(obstacles)
+        problem = problem_of_seam(self.robot, seam, self.constraints, clearances)
         return backwards(problem) if turned else problem
 
     def move_constraints(self, obstacles: Sequence[Any]) -> tuple[Constraint, ...]:
@@ -118,6 +113,33 @@ class JobSettings:
         found = self.clearances_with(obstacles)
         has_bodies = self.robot.urdf.has_collisions or any(item.obstacles for item in found)
         return (*self.constraints, *(found if has_bodies else ()))
+
+
+def problem_of_seam(
+    robot: RobotModel,
+    seam: Seam,
+    constraints: Sequence[Constraint],
+    clearances: Sequence[Clearance],
+) -> Problem:
+    """Return the problem of a seam, with the constraints and clearances of its job.
+
+    A clearance of its own comes in addition; the job's is left out where that one keeps as far.
+    """
+    own = clearances_among(seam.constraints)
+    shared = [
+        item
+        for item in clearances
+        if item.obstacles or not any(each.keeps_as_far(item) for each in own)
+    ]
+    problem = Problem(
+        robot,
+        seam.path,
+        seam.task,
+        constraints=(*constraints, *without_clearances(seam.constraints)),
+        relaxations=tuple(seam.relaxations),
+        clearance=(*own, *shared),
+    )
+    return problem if seam.costs is None else replace(problem, costs=tuple(seam.costs))
 
 
 class Work:
