@@ -181,7 +181,12 @@ PARTS = (
     ),
     Part(
         "bounds",
-        ("basics/series.py", "model/robot/chain_series.py", "model/motion/spline.py"),
+        (
+            "basics/series.py",
+            "model/robot/chain_series.py",
+            "model/robot/tool_rates.py",
+            "model/motion/spline.py",
+        ),
         (
             "basics/test_series.py",
             "robot/test_chain_series.py",

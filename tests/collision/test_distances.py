@@ -10,7 +10,7 @@ import pytest
 from selfmotion.basics import CollisionError
 from selfmotion.model.collision import Solid, distances as module
 from selfmotion.model.collision.distances import HullDistances
-from selfmotion.model.collision.pair_distances import MeshDistances
+from selfmotion.model.collision.mesh_distances import MeshDistances
 from selfmotion.model.robot import RobotModel
 from support.independent_distances import (
     KINDS,

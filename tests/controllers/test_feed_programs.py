@@ -16,9 +16,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import judged_program, program_deviation, read_program
+from selfmotion.shop.controllers.arcs import arc_through
+from selfmotion.shop.controllers.controller_axes import axes_of
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, Ramps, times_at
-from selfmotion.shop.controllers.program_settings import axes_of
-from selfmotion.shop.controllers.steps import arc_through
 from support.arms import robot_named
 from support.industrial import industrial_arm
 from support.played_programs import Off, off, read_poses

@@ -14,7 +14,7 @@ from selfmotion.certificate import Separation
 from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import judged_program, program_deviation, read_program
-from selfmotion.shop.controllers.program_settings import axes_of, tool_from_flange
+from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
 from selfmotion.shop.controllers.segments import NO_DEVIATION
 from selfmotion.shop.controllers.thinning import Operation, Section
 from selfmotion.work.job import Step

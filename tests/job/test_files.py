@@ -12,7 +12,8 @@ from selfmotion.basics import silent
 from selfmotion.model.task import SE3
 from selfmotion.planning.transfer import FreeMotions, free_motion
 from selfmotion.work.job import work
-from selfmotion.work.job.files import EarlierProgram, ResultCache
+from selfmotion.work.job.earlier_program import EarlierProgram
+from selfmotion.work.job.files import ResultCache
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])

@@ -15,24 +15,11 @@
 
 from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (
-    TURN as TURN,
     Array as Array,
     Flags as Flags,
     Ints as Ints,
-    as_called as as_called,
-    as_choice as as_choice,
-    as_flag as as_flag,
-    as_number as as_number,
-    as_numbers as as_numbers,
-    as_several as as_several,
-    as_whole as as_whole,
-    check_executor as check_executor,
-    is_number as is_number,
-    number_in as number_in,
     per_joint as per_joint,
     plain_numbers as plain_numbers,
-    public_name as public_name,
-    random_numbers as random_numbers,
     read_only as read_only,
     shown as shown,
 )
@@ -72,6 +59,29 @@ from selfmotion.basics.files import (
     write_csv as write_csv,
     write_text as write_text,
 )
+from selfmotion.basics.inputs import (
+    TURN as TURN,
+    as_called as as_called,
+    as_choice as as_choice,
+    as_flag as as_flag,
+    as_number as as_number,
+    as_numbers as as_numbers,
+    as_several as as_several,
+    as_whole as as_whole,
+    check_executor as check_executor,
+    is_number as is_number,
+    number_in as number_in,
+    public_name as public_name,
+    random_numbers as random_numbers,
+)
+from selfmotion.basics.interruption import (
+    Counts as Counts,
+    held_interruption as held_interruption,
+    obey_interruption as obey_interruption,
+    obeying as obeying,
+    presses as presses,
+    was_interrupted as was_interrupted,
+)
 from selfmotion.basics.jit import (
     ALL_WORKS as ALL_WORKS,
     FIRST_WORKS as FIRST_WORKS,
@@ -84,17 +94,18 @@ from selfmotion.basics.jit import (
     seconds_of_kernels as seconds_of_kernels,
     seconds_waited_for_kernels as seconds_waited_for_kernels,
 )
-from selfmotion.basics.progress import (
-    Counts as Counts,
-    Progress as Progress,
-    held_interruption as held_interruption,
-    obey_interruption as obey_interruption,
-    obeying as obeying,
-    one_blas_thread as one_blas_thread,
-    presses as presses,
-    silent as silent,
-    was_interrupted as was_interrupted,
+from selfmotion.basics.nested_tables import (
+    ANGLES as ANGLES,
+    FORMER_CLEARANCE as FORMER_CLEARANCE,
+    LENGTHS as LENGTHS,
+    PER_JOINT as PER_JOINT,
+    in_si as in_si,
+    is_share as is_share,
+    read_document as read_document,
+    read_values as read_values,
+    write_document as write_document,
 )
+from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import (
     Saved as Saved,
     description_of as description_of,
@@ -102,19 +113,11 @@ from selfmotion.basics.saved import (
     restore as restore,
 )
 from selfmotion.basics.tables import (
-    ANGLES as ANGLES,
-    FORMER_CLEARANCE as FORMER_CLEARANCE,
     LEFT_OUT as LEFT_OUT,
-    LENGTHS as LENGTHS,
-    PER_JOINT as PER_JOINT,
-    in_si as in_si,
-    is_share as is_share,
-    read_document as read_document,
     read_rows as read_rows,
     read_table as read_table,
-    read_values as read_values,
-    write_document as write_document,
 )
+from selfmotion.basics.threads import one_blas_thread as one_blas_thread
 from selfmotion.basics.units import (
     in_angle as in_angle,
     in_length as in_length,

@@ -9,14 +9,16 @@ from selfmotion.certificate.braking import (
     VelocityByPosition as VelocityByPosition,
 )
 from selfmotion.certificate.check import certify as certify
-from selfmotion.certificate.limits import (
+from selfmotion.certificate.ends import (
     ARRIVED as ARRIVED,
-    LIMIT_NAMES as LIMIT_NAMES,
     QUANTITIES as QUANTITIES,
     REST_ACCELERATION as REST_ACCELERATION,
     AtRest as AtRest,
     ClosedMotion as ClosedMotion,
     EndState as EndState,
+)
+from selfmotion.certificate.limits import (
+    LIMIT_NAMES as LIMIT_NAMES,
     JointLimits as JointLimits,
     arm_limits as arm_limits,
     limits_of_joints as limits_of_joints,

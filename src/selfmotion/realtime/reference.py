@@ -69,9 +69,6 @@ class MovingPose(Path):
         )
 
 
-# A tool motion on something that moves, such as a conveyor.
-
-
 @dataclass(frozen=True, eq=False)
 class Conveyed(Path):
     """A path that is carried along at a constant velocity.

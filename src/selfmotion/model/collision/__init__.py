@@ -21,22 +21,26 @@ from selfmotion.model.collision.displaced import (
 )
 from selfmotion.model.collision.exact import CollisionModel as CollisionModel
 from selfmotion.model.collision.obstacles import (
+    Obstacle as Obstacle,
+    obstacle_from_dict as obstacle_from_dict,
+    obstacle_shapes as obstacle_shapes,
+)
+from selfmotion.model.collision.overlaps import (
+    SAMPLES as SAMPLES,
+    Closest as Closest,
+    Overlap as Overlap,
+    how_near as how_near,
+    srdf_line as srdf_line,
+)
+from selfmotion.model.collision.pairs import (
+    disabled_links as disabled_links,
+    srdf_notes as srdf_notes,
+)
+from selfmotion.model.collision.shapes import (
     Box as Box,
     Capsule as Capsule,
     Cylinder as Cylinder,
     Mesh as Mesh,
-    Obstacle as Obstacle,
     Sphere as Sphere,
-    obstacle_from_dict as obstacle_from_dict,
-    obstacle_shapes as obstacle_shapes,
-)
-from selfmotion.model.collision.pairs import (
-    SAMPLES as SAMPLES,
-    Closest as Closest,
-    Overlap as Overlap,
-    disabled_links as disabled_links,
-    how_near as how_near,
-    srdf_line as srdf_line,
-    srdf_notes as srdf_notes,
 )
 from selfmotion.model.collision.solids import Solid as Solid

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.model.collision.exact import CollisionModel
-from selfmotion.model.collision.pairs import SAMPLES, srdf_line
+from selfmotion.model.collision.overlaps import SAMPLES, srdf_line
 from selfmotion.model.robot import RobotModel
 
 # Share of configurations above which an overlap is by design.

@@ -11,7 +11,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.model.collision.bodies import place_of
 from selfmotion.model.collision.distances import Ints
 from selfmotion.model.collision.exact import CollisionModel
-from selfmotion.model.collision.pairs import SAMPLES, hull_overlaps
+from selfmotion.model.collision.overlaps import SAMPLES, hull_overlaps
 from selfmotion.model.task import SE3
 
 # Share of sampled configurations in which hulls of a pair may overlap although its links do not.

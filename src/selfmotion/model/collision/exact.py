@@ -17,15 +17,9 @@ from selfmotion.model.collision import bodies as of_bodies
 from selfmotion.model.collision.bodies import Body, obstacle_bodies
 from selfmotion.model.collision.distances import HullDistances, Ints
 from selfmotion.model.collision.obstacles import Obstacle
+from selfmotion.model.collision.overlaps import Closest, checked_pairs, count_overlaps, links_of
 from selfmotion.model.collision.pair_distances import PairDistances
-from selfmotion.model.collision.pairs import (
-    Closest,
-    checked_pairs,
-    count_overlaps,
-    held_pairs,
-    held_together,
-    links_of,
-)
+from selfmotion.model.collision.pairs import held_pairs, held_together
 from selfmotion.model.robot import RobotModel
 
 # Overlap of bodies in contact that counts as rounding [m].

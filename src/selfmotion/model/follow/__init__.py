@@ -4,9 +4,8 @@ from selfmotion.model.follow.coordinates import (
     Coordinates as Coordinates,
     generic_values as generic_values,
 )
-from selfmotion.model.follow.follow import (
-    BoundTaskFrame as BoundTaskFrame,
-    Follow as Follow,
+from selfmotion.model.follow.follow import BoundTaskFrame as BoundTaskFrame, Follow as Follow
+from selfmotion.model.follow.follows import (
     Follows as Follows,
     chain_tables as chain_tables,
     every_column as every_column,

@@ -9,7 +9,8 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.follow.extended_chain import ExtendedChain
-from selfmotion.model.follow.follow import BoundTaskFrame, Follows
+from selfmotion.model.follow.follow import BoundTaskFrame
+from selfmotion.model.follow.follows import Follows
 from selfmotion.model.follow.virtual_joints import VirtualJoints
 from selfmotion.model.path import Path
 from selfmotion.model.robot import mean_lever

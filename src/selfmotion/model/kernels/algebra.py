@@ -249,8 +249,6 @@ def _rotate(a: Array, vectors: Array, i: int, j: int) -> None:
         )
 
 
-# Bases of null spaces, carried along a motion without turning inside the null space.
-
 # Largest number of iterations: quadratic convergence once a basis is nearly orthonormal.
 _POLAR = 40
 # Pivot of JJᵀ [m², rad²] below which Jacobians count as singular.

@@ -117,9 +117,6 @@ def pull_damping(
         add_angular(twist, factor, cross(angular_part(left), turn))
 
 
-# One stage of eq. 4 forward.
-
-
 @kernel
 def advance(
     s: int,
@@ -220,9 +217,6 @@ def step(table: Array, s: int, n: int, h: float) -> None:
         third = qd_of(table, s - 1, n)
         for k in range(n):
             q[k] = start[k] + h / 6.0 * (first[k] + 2.0 * (second[k] + third[k]) + slope[k])
-
-
-# All stages of eq. 4 backward: the exact derivative of the discrete scheme.
 
 
 class Space(NamedTuple):

@@ -11,13 +11,7 @@ from selfmotion.model.path.base import (
     path_series as path_series,
     rotations_about as rotations_about,
 )
-from selfmotion.model.path.derived import (
-    Placed as Placed,
-    Retimed as Retimed,
-    Reversed as Reversed,
-    Section as Section,
-    section_at_rest as section_at_rest,
-)
+from selfmotion.model.path.derived import Placed as Placed, Reversed as Reversed
 from selfmotion.model.path.feed import Feed as Feed, FeedPossible as FeedPossible
 from selfmotion.model.path.feed_profile import FeedProfile as FeedProfile
 from selfmotion.model.path.joined import (
@@ -26,11 +20,16 @@ from selfmotion.model.path.joined import (
     with_leads as with_leads,
 )
 from selfmotion.model.path.pace import Pace as Pace, times_when as times_when
-from selfmotion.model.path.polyline import Polyline as Polyline, merged as merged
+from selfmotion.model.path.polyline import Polyline as Polyline
 from selfmotion.model.path.rates import (
     edges_of as edges_of,
     spread_along as spread_along,
     twist_rates as twist_rates,
+)
+from selfmotion.model.path.retimed import (
+    Retimed as Retimed,
+    Section as Section,
+    section_at_rest as section_at_rest,
 )
 from selfmotion.model.path.run_ups import (
     Stroke as Stroke,
@@ -42,6 +41,7 @@ from selfmotion.model.path.shapes import (
     Spiral as Spiral,
     TimeLaw as TimeLaw,
 )
+from selfmotion.model.path.simplified import merged as merged
 from selfmotion.model.path.twist import TwistPath as TwistPath
 from selfmotion.model.path.waypoints import Waypoints as Waypoints
 from selfmotion.model.path.weave import Weave as Weave

@@ -114,9 +114,6 @@ class Round(Path):
         return PathSeries(place, round_axis if self.turn_tool else series.constant(1.0, round_axis))
 
 
-# Straight lines and circles.
-
-
 @dataclass(frozen=True, eq=False)
 class Line(Path, kind="line"):
     """A straight line; the orientation turns about one fixed axis.

@@ -17,7 +17,7 @@ from selfmotion.model.robot.chain import (
     Kinematics as Kinematics,
     null_space as null_space,
 )
-from selfmotion.model.robot.chain_series import ChainSeries as ChainSeries, ToolRates as ToolRates
+from selfmotion.model.robot.chain_series import ChainSeries as ChainSeries
 from selfmotion.model.robot.collada import says_unit as says_unit, unit_of as unit_of
 from selfmotion.model.robot.configurations import mean_lever as mean_lever
 from selfmotion.model.robot.coordinates import (
@@ -34,6 +34,7 @@ from selfmotion.model.robot.dynamics import (
 )
 from selfmotion.model.robot.full_model import mesh_digests as mesh_digests
 from selfmotion.model.robot.loading import load_robot as load_robot
+from selfmotion.model.robot.mimic import mimic_of as mimic_of
 from selfmotion.model.robot.model import LIMITS as LIMITS, RobotModel as RobotModel
 from selfmotion.model.robot.mounting import (
     UrdfShape as UrdfShape,
@@ -49,9 +50,7 @@ from selfmotion.model.robot.placements import (
     place_tips as place_tips,
     placements as placements,
 )
-from selfmotion.model.robot.tree_arrays import (
-    mimic_of as mimic_of,
-)
+from selfmotion.model.robot.tool_rates import ToolRates as ToolRates
 from selfmotion.model.robot.urdf import (
     BASE_JOINT as BASE_JOINT,
     TOOL_JOINT as TOOL_JOINT,
@@ -59,11 +58,8 @@ from selfmotion.model.robot.urdf import (
     UrdfJoint as UrdfJoint,
     UrdfPart as UrdfPart,
 )
-from selfmotion.model.robot.urdf_text import (
-    Packages as Packages,
-    expand as expand,
-    is_xacro as is_xacro,
-)
+from selfmotion.model.robot.urdf_text import Packages as Packages
+from selfmotion.model.robot.xacro_text import expand as expand, is_xacro as is_xacro
 
 __all__ = [
     "Coordinate",

@@ -9,10 +9,10 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, as_number, nearest, read_only
 from selfmotion.model.robot.full_model import full_model, locked_configuration, name_links
+from selfmotion.model.robot.mimic import Mimic, coupling_of, mimic_of, tighter_limits
 from selfmotion.model.robot.model import LIMITS, RobotModel
 from selfmotion.model.robot.mounting import moved_base
 from selfmotion.model.robot.named import names_of
-from selfmotion.model.robot.tree_arrays import Mimic, coupling_of, mimic_of, tighter_limits
 from selfmotion.model.robot.urdf import BASE_JOINT, Urdf, UrdfJoint, parse_urdf
 
 # Excess of a held joint over its limits that counts as rounding of a file [rad or m].

@@ -18,8 +18,9 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
+from selfmotion.model.robot.mimic import Coupling
 from selfmotion.model.robot.placements import place_along, rebase
-from selfmotion.model.robot.tree_arrays import JOINT, ChainArrays, Coupling, serial_arrays
+from selfmotion.model.robot.tree_arrays import JOINT, ChainArrays, serial_arrays
 
 # Number of the world's frame.
 WORLD = 0

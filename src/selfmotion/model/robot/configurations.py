@@ -1,4 +1,4 @@
-"""Configurations of an arm: as they are given, weighed, found for a pose, and free to move."""
+"""Configurations of an arm, as they are given, and weights of its joints."""
 
 from __future__ import annotations
 
@@ -7,19 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import (
     Array,
-    InverseKinematicsError,
     RobotError,
     as_number,
-    as_whole,
     nearest,
     plain_numbers,
     shown,
 )
-from selfmotion.model.task import Task, as_pose
 
 if TYPE_CHECKING:
     from selfmotion.model.robot.model import RobotModel
@@ -104,121 +100,3 @@ def part_weights(robot: RobotModel, weights: Mapping[str, float]) -> Array:
             )
         found[mine] *= as_number(weight, f"weight of '{name}'", least=0.0, error=RobotError)
     return found
-
-
-# How freely the joints of an arm move its tool in the rows of a task.
-
-# Singular values, and rates of rows, below this [m, rad] are zero.
-_ZERO = 1e-6
-# Relative singular values below this are rounding.
-_ROUNDING = 1e-12
-# Samples of which the most dexterous one is chosen.
-_SAMPLES = 1000
-
-
-def redundancy(robot: RobotModel, task: Task) -> int:
-    """Return n - rank J of a task at generic configurations."""
-    jacobians = [robot.task_jacobian(q, task) for q in robot.generic_configurations()]
-    return robot.dof - int(max(np.linalg.matrix_rank(jacobians, tol=_ZERO)))
-
-
-def can_follow(robot: RobotModel, task: Task) -> bool:
-    """Return whether the tool can move in all rows of a task; see `RobotModel.can_follow`."""
-    if task is Task.PLANAR_POSE:
-        jacobians = np.array([robot.jacobian(q) for q in robot.generic_configurations()])
-        if np.abs(jacobians[:, 2:5]).max() > _ZERO:
-            return False
-    return robot.dof - redundancy(robot, task) == task.dimension
-
-
-def most_dexterous(robot: RobotModel, task: Task) -> Array:
-    """Return the sample (n,) in the middle half of the limits with the largest √det(JJᵀ)."""
-    lower, upper = robot.finite_limits()
-    share = np.random.default_rng(0).uniform(0.25, 0.75, (_SAMPLES, robot.dof))
-    samples = lower + (upper - lower) * share
-    jacobians = np.array([robot.task_jacobian(q, task) for q in samples])
-    determinants = np.linalg.det(jacobians @ jacobians.transpose(0, 2, 1))
-    return np.array(samples[np.argmax(determinants)])
-
-
-def null_space_at(robot: RobotModel, q: Array, task: Task) -> Array:
-    """Return orthonormal null-space bases at checked `q`; see `RobotModel.null_space`."""
-    jacobians = robot.task_jacobian(q, task)
-    _, values, right = np.linalg.svd(jacobians)
-    large = values > _ROUNDING * values.max(axis=-1, keepdims=True)
-    ranks = np.atleast_1d(np.sum(large, axis=-1))
-    # Without configurations, the generic rank.
-    rank = int(ranks[0]) if len(ranks) else robot.dof - redundancy(robot, task)
-    other = np.flatnonzero(ranks != rank)
-    if len(other):
-        raise RobotError(
-            f"{robot.name}: the Jacobian of task '{task.value}' has rank {rank} at configuration 0 "
-            f"and {ranks[other[0]]} at configuration {other[0]}, expected one rank; ask for "
-            f"the null space of these one at a time"
-        )
-    return np.asarray(np.swapaxes(right[..., rank:, :], -1, -2))
-
-
-# Inverse kinematics: Levenberg-Marquardt on the rows of a task, within joint limits.
-
-# Error of a solution, far below a certificate's tolerance.
-_IK_TOLERANCE = 1e-10
-# Largest number of steps from one start.
-_IK_STEPS = 100
-
-
-def inverse_kinematics(
-    robot: RobotModel,
-    pose: pin.SE3 | npt.ArrayLike,
-    task: Task,
-    seed: npt.ArrayLike | None,
-    rng: np.random.Generator,
-    attempts: int,
-) -> Array:
-    """Return a configuration that puts the tool at a pose; see `RobotModel.inverse_kinematics`."""
-    pose = as_pose(pose, f"{robot.name}: the pose", RobotError)
-    attempts = as_whole(attempts, "attempts", 1, 10**6, RobotError)
-    lower, upper = robot.finite_limits()
-    start = 0.5 * (lower + upper) if seed is None else robot.configuration(seed)
-    best = (np.inf, np.inf)
-    for _ in range(attempts):
-        q, residual = _levenberg_marquardt(robot, pose, task, start)
-        if max(residual) < _IK_TOLERANCE:
-            return q
-        best = min(best, residual, key=sum)
-        start = rng.uniform(lower, upper)
-    raise InverseKinematicsError(
-        f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
-        f"{np.round(pose.translation, 4).tolist()} m for task '{task.value}': the best of "
-        f"{attempts} attempts misses by {best[0]:.3g} m and {best[1]:.3g} rad; "
-        f"move the pose into the workspace",
-        position_miss=best[0],
-        rotation_miss=best[1],
-    )
-
-
-def _levenberg_marquardt(
-    robot: RobotModel, pose: pin.SE3, task: Task, start: Array
-) -> tuple[Array, tuple[float, float]]:
-    q, damping = np.clip(start, robot.lower, robot.upper), 1e-3
-    actual = robot.pose(q)
-    error = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-    for _ in range(_IK_STEPS):
-        if np.linalg.norm(error) < 0.01 * _IK_TOLERANCE:
-            break
-        jacobian = robot.task_jacobian(q, task)
-        gradient = jacobian.T @ error
-        # Joints held at a limit that the step would leave take no part in it.
-        free = ~((q <= robot.lower) & (gradient < 0) | (q >= robot.upper) & (gradient > 0))
-        jacobian = jacobian * free
-        normal = jacobian @ jacobian.T + damping * np.eye(task.dimension)
-        trial = np.clip(q + jacobian.T @ np.linalg.solve(normal, error), robot.lower, robot.upper)
-        actual = robot.pose(trial)
-        new = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-        if np.linalg.norm(new) < np.linalg.norm(error):
-            q, error, damping = trial, new, max(0.1 * damping, 1e-14)
-        else:
-            damping *= 10.0
-            if damping > 1e6:
-                break
-    return q, task.miss(pose, robot.pose(q))

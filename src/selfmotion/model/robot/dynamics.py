@@ -8,8 +8,8 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, series
 from selfmotion.model.robot.chain_series import ChainSeries
+from selfmotion.model.robot.mimic import Coupling
 from selfmotion.model.robot.model import RobotModel
-from selfmotion.model.robot.tree_arrays import Coupling
 
 # Relative rounding of an inertia: files with nine digits, products of matrices.
 _ROUNDING = 1e-9

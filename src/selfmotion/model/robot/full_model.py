@@ -37,9 +37,6 @@ def locked_configuration(model: Any, locked: Mapping[str, float]) -> tuple[Array
     return reference, ids
 
 
-# Mesh files of a URDF that are missing or cannot be read.
-
-
 class BadMesh(NamedTuple):
     """A mesh that is not there.
 

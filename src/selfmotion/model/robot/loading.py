@@ -26,8 +26,9 @@ from selfmotion.model.robot.mounting import (
 from selfmotion.model.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
 from selfmotion.model.robot.pinocchio_model import urdf_text_of
 from selfmotion.model.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
-from selfmotion.model.robot.urdf_text import Packages, expand, is_xacro
+from selfmotion.model.robot.urdf_text import Packages
 from selfmotion.model.robot.urdf_unsaid import units_unsaid
+from selfmotion.model.robot.xacro_text import expand, is_xacro
 from selfmotion.model.task import as_pose
 
 # Name of a URDF's text in messages.

@@ -16,19 +16,17 @@ from selfmotion.model.robot.chain import WORLD, Chain
 from selfmotion.model.robot.configurations import (
     as_configuration,
     as_configurations,
-    can_follow,
-    inverse_kinematics,
     joint_weights,
-    most_dexterous,
-    null_space_at,
     part_weights,
-    redundancy,
     speed_weights,
 )
+from selfmotion.model.robot.dexterity import can_follow, most_dexterous, null_space_at, redundancy
 from selfmotion.model.robot.full_model import readable_visuals, reduced_geometry, stand_in
+from selfmotion.model.robot.inverse_kinematics import inverse_kinematics
+from selfmotion.model.robot.mimic import Coupling
 from selfmotion.model.robot.named import home_of
 from selfmotion.model.robot.position_based import position_based_limits
-from selfmotion.model.robot.tree_arrays import Coupling, TreeArrays, tree_arrays
+from selfmotion.model.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.model.robot.urdf import Urdf
 from selfmotion.model.task import Task
 

@@ -28,18 +28,18 @@ from selfmotion.model.robot.urdf_elements import (
     without_limits,
     zero_speeds,
 )
-from selfmotion.model.robot.urdf_text import (
-    Packages,
+from selfmotion.model.robot.urdf_text import Packages
+from selfmotion.model.robot.urdf_unsaid import (
+    angles_in_degrees,
+    axes_unsaid,
+    limits_passed_over,
+)
+from selfmotion.model.robot.xacro_text import (
     check_expanded,
     make_meshes_absolute,
     make_single_angles,
     parsed_by_yourdfpy,
     root_of,
-)
-from selfmotion.model.robot.urdf_unsaid import (
-    angles_in_degrees,
-    axes_unsaid,
-    limits_passed_over,
 )
 
 # Fixed joint of a placed base.

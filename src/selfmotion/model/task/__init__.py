@@ -12,16 +12,18 @@ from selfmotion.model.task.poses import (
     as_pose as as_pose,
     exp3 as exp3,
     log3 as log3,
-    rotation_vectors as rotation_vectors,
     rpy as rpy,
     skew as skew,
-    skews as skews,
-    turn as turn,
-    turning as turning,
 )
 from selfmotion.model.task.relaxation import (
     POSITION_ROWS as POSITION_ROWS,
     ROW_NAMES as ROW_NAMES,
     Relaxation as Relaxation,
+)
+from selfmotion.model.task.rotation_vectors import (
+    rotation_vectors as rotation_vectors,
+    skews as skews,
+    turn as turn,
+    turning as turning,
 )
 from selfmotion.model.task.rows import Task as Task

@@ -91,8 +91,6 @@ class DampingLaw:
         return self.strength * np.maximum(rest, 0.0)
 
 
-# How fast the tool is brought back to its path where integration or damping let it off.
-
 # Rate K of the pose feedback, which reduces an error e by K e, times the motion's duration.
 _FEEDBACK = 20.0
 

@@ -6,10 +6,10 @@ from selfmotion.paper.baselines.base import (
     plan_by as plan_by,
     start_of as start_of,
 )
+from selfmotion.paper.baselines.extended_jacobian import ExtendedJacobian as ExtendedJacobian
 from selfmotion.paper.baselines.lagrange import LagrangianOptimum as LagrangianOptimum
 from selfmotion.paper.baselines.local import (
     DampedLeastSquares as DampedLeastSquares,
-    ExtendedJacobian as ExtendedJacobian,
     GradientProjection as GradientProjection,
     PseudoInverse as PseudoInverse,
 )

@@ -1,4 +1,4 @@
-"""Methods that decide from the present pose alone, by pseudo-inverses or more rows."""
+"""Methods that decide from the present pose alone, by pseudo-inverses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, ProblemError, as_number
 from selfmotion.model.motion import Grid, Sampling
-from selfmotion.model.robot import null_space
 from selfmotion.paper.baselines.base import Motion, PoseFeedback, along_rate, costs, pseudo_inverse
 from selfmotion.problem.costs import Cost, Manipulability, Samples
 from selfmotion.problem.problem import Problem
@@ -175,69 +174,3 @@ def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Arra
     if partials.q is None:
         raise ProblemError(f"cost '{criterion.name}' does not depend on the pose")
     return np.asarray(partials.q[0])
-
-
-# The extended Jacobian: rows added to the task until it is square.
-
-# The attraction to the stationary pose, times the duration.
-_ATTRACTION = 20.0
-
-# Step of the central differences of the projected gradient [rad or m].
-_DIFFERENCE = 1e-5
-
-
-@dataclass(frozen=True)
-class ExtendedJacobian:
-    """Keeps h(q) stationary in the null space: Nᵀ∇h = 0 as r more rows, and no freedom is left.
-
-    J. Baillieul, "Kinematic programming alternatives for redundant manipulators", ICRA 1985. With
-    the projected gradient g = (I - J⁺J)∇h, the rows are Nᵀ ∂g/∂q q̇ = -κ Nᵀg, so that |g| decays at
-    the rate κ from a start that is not stationary. Which stationary pose it tracks, of largest or
-    least h, depends on the start; where the square matrix is singular (Baillieul's algorithmic
-    singularities) the motion breaks down.
-
-    Parameters
-    ----------
-    criterion : Cost
-        h, as a cost of the pose; -w by default.
-    attraction : float, optional
-        κ [1/s]; 20 over the duration by default.
-    """
-
-    criterion: Cost = MANIPULABILITY
-    attraction: float | None = None
-
-    def solve(self, problem: Problem) -> Motion:
-        """See `Method.solve`."""
-        feedback = PoseFeedback(problem)
-        attraction = self.attraction
-        if attraction is None:
-            attraction = _ATTRACTION / problem.path.duration
-        counted = 0
-
-        def projected(t: float, q: Array) -> Array:
-            nonlocal counted
-            counted += 1
-            here = feedback(t, q)
-            slope = pose_gradient(problem, self.criterion, t, q)
-            y = np.linalg.solve(here.gram, here.jacobian @ slope)
-            return np.asarray(slope - here.jacobian.T @ y)
-
-        def rate(t: float, q: Array) -> Array:
-            here = feedback(t, q)
-            null = null_space(here.jacobian).T
-            shifts = _DIFFERENCE * np.eye(len(q))
-            change = np.array([projected(t, q + s) - projected(t, q - s) for s in shifts]).T
-            square = np.vstack([here.jacobian, null @ change / (2.0 * _DIFFERENCE)])
-            wanted = np.append(here.command, -attraction * (null @ projected(t, q)))
-            try:
-                return np.asarray(np.linalg.solve(square, wanted))
-            except np.linalg.LinAlgError:
-                raise BreakdownError(
-                    f"{problem.robot.name}: the extended Jacobian is singular at t = {t:.4g} s",
-                    time=t,
-                ) from None
-
-        motion = along_rate(problem, rate, "followed the extended Jacobian; nothing was optimised")
-        jacobians = motion.jacobian_evaluations + counted
-        return Motion(motion.at, motion.message, 1, jacobians)

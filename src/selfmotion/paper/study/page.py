@@ -7,13 +7,10 @@ from enum import Enum
 from html import escape
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from selfmotion.paper.study.results import Chapter, Claim, Study, Table
-
-if TYPE_CHECKING:
-    pass
 from selfmotion.paper.study.figures import to_svg, write_png
+from selfmotion.paper.study.results import Chapter, Claim, Study, Table
 
 
 def write(study: Study, folder: Path) -> list[Path]:

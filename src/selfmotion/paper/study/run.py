@@ -2,21 +2,18 @@
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from selfmotion.paper.study import claims, expense, questions, trajectory
+from selfmotion.paper.study import claims, expense, other_works, questions, trajectory
 from selfmotion.paper.study.context import Context, Scale
 from selfmotion.paper.study.results import Chapter, Study
 
-if TYPE_CHECKING:
-    pass
 _PARTS: dict[str, Callable[[Context], Chapter]] = {
     "sample trajectory": trajectory.chapter,
     "claims": claims.chapter,
     "surging": questions.surging,
     "cost of the method": expense.chapter,
     "open questions": questions.chapter,
-    "other works": claims.other_works,
+    "other works": other_works.other_works,
 }
 
 # Part names in order, for a progress bar.

@@ -13,11 +13,14 @@ from selfmotion.planning.result.archive import (
     read_kept as read_kept,
     write_kept as write_kept,
 )
+from selfmotion.planning.result.bundles import (
+    read_bundle as read_bundle,
+    write_bundle as write_bundle,
+)
 from selfmotion.planning.result.comparison import Comparison as Comparison, compare as compare
 from selfmotion.planning.result.measured import (
     LimitsUsed as LimitsUsed,
     NullSpaceVelocity as NullSpaceVelocity,
-    Reversals as Reversals,
     quantities_of_pace as quantities_of_pace,
 )
 from selfmotion.planning.result.move import Move as Move, is_move as is_move, load_move as load_move
@@ -27,12 +30,7 @@ from selfmotion.planning.result.pacing import (
     along as along,
     fastest_pace as fastest_pace,
 )
-from selfmotion.planning.result.parts import (
-    Parts as Parts,
-    load_parts as load_parts,
-    read_bundle as read_bundle,
-    write_bundle as write_bundle,
-)
+from selfmotion.planning.result.parts import Parts as Parts, load_parts as load_parts
 from selfmotion.planning.result.plan import (
     Plan as Plan,
     Views as Views,
@@ -48,6 +46,7 @@ from selfmotion.planning.result.retiming import (
     retime as retime,
     slowdown as slowdown,
 )
+from selfmotion.planning.result.reversals import Reversals as Reversals
 from selfmotion.planning.result.specification import (
     CheckedMotion as CheckedMotion,
     MotionSpecification as MotionSpecification,

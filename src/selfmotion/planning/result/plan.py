@@ -54,13 +54,13 @@ from selfmotion.planning.result.archive import Archive, in_order_of
 from selfmotion.planning.result.measured import (
     LimitsUsed,
     NullSpaceVelocity,
-    Reversals,
     cost_of,
     deviation_along,
     limits_used,
     null_space_velocity,
 )
 from selfmotion.planning.result.report import FUNCTION, Report
+from selfmotion.planning.result.reversals import Reversals
 from selfmotion.problem.costs import Cost, FunctionCost, LostCost, metres_of
 from selfmotion.problem.problem.problem import Problem
 

@@ -301,7 +301,9 @@ def _worst_first(formulation: Formulation, times: Array) -> list[float]:
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return the cause why the arm reaches no further at q (n,); "" for none found."""
     own, follows, causes = poses.coordinates, poses.follows, []
-    near = np.minimum(q - own.lower, own.upper - q)[: poses.formulation.problem.robot.dof] < AT_LIMIT
+    near = (
+        np.minimum(q - own.lower, own.upper - q)[: poses.formulation.problem.robot.dof] < AT_LIMIT
+    )
     if np.any(near):
         names = ", ".join(f"'{own.names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")

@@ -58,7 +58,8 @@ from selfmotion.problem.constraints.limits import (
 from selfmotion.problem.constraints.position_dependent import (
     PositionDependentVelocityLimits as PositionDependentVelocityLimits,
 )
-from selfmotion.problem.constraints.tool import Tilt as Tilt, ToolLimits as ToolLimits
+from selfmotion.problem.constraints.tilt import Tilt as Tilt
+from selfmotion.problem.constraints.tool import ToolLimits as ToolLimits
 
 __all__ = [
     "ActiveConstraint",

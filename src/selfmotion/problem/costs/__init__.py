@@ -20,7 +20,6 @@ from selfmotion.problem.costs.joints import (
     JointAcceleration as JointAcceleration,
     JointJerk as JointJerk,
     JointLimitDistance as JointLimitDistance,
-    JointReversals as JointReversals,
     JointVelocity as JointVelocity,
     PathLength as PathLength,
     Posture as Posture,
@@ -37,6 +36,7 @@ from selfmotion.problem.costs.penalties import (
     LimitUse as LimitUse,
     OffPath as OffPath,
 )
+from selfmotion.problem.costs.reversals import JointReversals as JointReversals
 from selfmotion.problem.costs.samples import (
     PlacedLater as PlacedLater,
     Samples as Samples,

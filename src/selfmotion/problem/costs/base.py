@@ -133,9 +133,6 @@ def half_square(weight: Array, x: Array) -> Array:
     return np.asarray(0.5 * np.einsum("si,si->s", x, weighted(weight, x)))
 
 
-# A cost that counts more, or less.
-
-
 @dataclass(frozen=True, eq=False)
 class Scaled(Cost):
     """Another cost, G times a factor.

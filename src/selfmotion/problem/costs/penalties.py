@@ -94,8 +94,6 @@ class LimitUse(Cost):
         return top[:, 0] * total ** (1.0 / self.power), speed, rate
 
 
-# The price of limits that are passed, for motions that are optimised without constraints.
-
 # The penalty starts at this distance from a limit of position [rad or m], and at this unused share
 # of a speed.
 _MARGIN = 0.02
@@ -139,9 +137,6 @@ class BeyondLimits(Cost):
     def gradient(self, samples: Samples) -> Partials:
         far, fast = self._beyond(samples)
         return Partials(q=self.weight * far, qd=self.weight * fast / self.speed)
-
-
-# The price of leaving the path, for motions that damping takes off it.
 
 
 @dataclass(frozen=True)

@@ -88,8 +88,6 @@ def _order(speeds: list[float]) -> int:
     return 2 if far == 0.0 or near <= far * 0.5**_SMOOTH else 1
 
 
-# How far a tool goes along its path.
-
 # Samples of a path's length at the start …
 _SAMPLES = 101
 # … and at most …

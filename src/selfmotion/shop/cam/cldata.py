@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, lines_of
-from selfmotion.shop.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
+from selfmotion.shop.cam.arcs import arc_points
+from selfmotion.shop.cam.cuts import Machine, unit_axis
+from selfmotion.shop.cam.drilling import Pecks, drill
 from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows
 
 # Inch [m].

@@ -1,9 +1,8 @@
-"""Cuts of machine tools' programs at a feed, rapids in between, arcs and holes."""
+"""Cuts of machine tools' programs at a feed, and rapids in between."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,7 +37,7 @@ _FREE_MOTION_NOTE = (
 )
 _UP = np.array([0.0, 0.0, 1.0])
 # Difference of positions and axes of poses that are the same [m].
-_SAME_POSE = 1e-9
+SAME_POSE = 1e-9
 # Largest speed of a rapid that is part of a cut [m/s].
 RAPID = 0.1
 # Largest distance from the tool's axis of a rapid along it, by rounding of files [m].
@@ -89,7 +88,7 @@ class Cut:
         """Add a pose, unless it is the last one again."""
         if self.positions:
             away = np.abs(position - self.positions[-1]).max(), np.abs(axis - self.axes[-1]).max()
-            if max(away) < _SAME_POSE:
+            if max(away) < SAME_POSE:
                 return
         self.labels.append(label)
         self.positions.append(position)
@@ -258,7 +257,7 @@ class Machine:
 
     def _height(self, position: Array, axis: Array) -> float:
         """Return the height of a place [m]; infinite where it is not known or the tool tilted."""
-        is_up = float(np.abs(axis - _UP).max()) < _SAME_POSE
+        is_up = float(np.abs(axis - _UP).max()) < SAME_POSE
         return float(position @ _UP) if is_up and not np.isnan(position).any() else np.inf
 
     def _is_along(self, position: Array, axis: Array) -> bool:
@@ -379,190 +378,3 @@ def unit_axis(values: Sequence[float], machine: Machine) -> Array:
     if not 1e-6 < length < 1e6:
         raise machine.fault(f"tool axis {axis.tolist()} has no direction")
     return axis / length
-
-
-# Arcs of machines as points: circles about an axis, and helices along it.
-
-# Largest deviation of chords from their arc [m].
-_CHORD_TOLERANCE = 1e-5
-# Difference of the distances of an arc's ends from its centre, and by which ends may be farther
-# apart than the circle is wide [m].
-_RADIUS_TOLERANCE = 2e-4
-# Largest radius of an arc that is no fault of what wrote it [m].
-_MAX_RADIUS = 1e5
-# Largest number of chords of an arc.
-_MAX_POINTS = 100_000
-
-
-def arc_points(
-    machine: Machine, start: Array, goal: Array, center: Array, axis: Array, more_turns: int = 0
-) -> Array:
-    """Return points (K, 3) of an arc, its end the last one.
-
-    It goes right-handed about an axis through the centre, and evenly along it; where both ends are
-    in one direction it is a whole turn.
-
-    Parameters
-    ----------
-    machine : Machine
-        Whose line is read.
-    start, goal, center, axis : (3,)
-    more_turns : int
-        Whole turns besides.
-
-    Raises
-    ------
-    FileFormatError
-        The ends are not as far from the axis as each other, or the arc is too large.
-    """
-    if np.isnan(start).any() or np.isnan(goal).any():
-        raise machine.fault(
-            "an arc begins where X, Y or Z is not known yet: give X, Y and Z in a rapid before"
-        )
-    axis = axis / np.linalg.norm(axis)
-    heights = (start - center) @ axis, (goal - center) @ axis
-    arms = start - center - heights[0] * axis, goal - center - heights[1] * axis
-    radius, other = (float(np.linalg.norm(arm)) for arm in arms)
-    if radius < _SAME_POSE or abs(radius - other) > _RADIUS_TOLERANCE:
-        raise machine.fault(
-            f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
-            f"{1e3 * other:.4g} mm from it"
-        )
-    if radius > _MAX_RADIUS:
-        raise machine.fault(f"the arc has a radius of {radius:.4g} m")
-    x = arms[0] / radius
-    y = np.cross(axis, x)
-    turn = float(np.arctan2(arms[1] @ y, arms[1] @ x)) % (2.0 * np.pi)
-    if turn < 1e-9:
-        turn = 2.0 * np.pi
-    turn += 2.0 * np.pi * more_turns
-    count = max(
-        2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD_TOLERANCE / radius)))))
-    )
-    if count > _MAX_POINTS:
-        raise machine.fault(f"the arc takes {count} chords, expected {_MAX_POINTS} at most")
-    share = np.arange(1, count + 1)[:, None] / count
-    angle, radii = turn * share, radius + (other - radius) * share
-    points = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
-    points = points + (heights[0] + (heights[1] - heights[0]) * share) * axis
-    points[-1] = goal
-    return np.asarray(points)
-
-
-def center_by_radius(
-    machine: Machine, start: Array, goal: Array, radius: float, sense: float
-) -> Array:
-    """Return the centre (2,) of an arc in its plane.
-
-    Parameters
-    ----------
-    machine : Machine
-        Whose line is read.
-    start, goal : (2,)
-    radius : float
-        [m]; below 0 for an arc of more than half a turn.
-    sense : float
-        1 for an arc that goes right-handed, -1 for one that does not.
-
-    Raises
-    ------
-    FileFormatError
-        No such arc joins the ends.
-    """
-    chord = goal - start
-    length = float(np.linalg.norm(chord))
-    if length < _SAME_POSE or length > 2.0 * abs(radius) + _RADIUS_TOLERANCE:
-        raise machine.fault(
-            f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
-        )
-    height = np.sqrt(max(0.0, radius**2 - 0.25 * length**2))
-    side = sense if radius > 0.0 else -sense
-    normal = np.array([-chord[1], chord[0]]) / length
-    return np.asarray(start + 0.5 * chord + side * height * normal)
-
-
-# Holes that cycles of machines drill: down at the feed, and straight out again.
-
-# Distance of the tool from the bottom of a hole that is there already, or comes back to break
-# chips [m].
-_OFF = 5e-4
-_MAX_PECKS = 10_000
-
-
-class Pecks(NamedTuple):
-    """Peck cycle of a deep hole: depth of a peck [m], and full or partial retraction between."""
-
-    first: float
-    others: float
-    is_out: bool
-
-
-def drill(
-    machine: Machine,
-    above: Array,
-    bottom: Array,
-    axis: Array,
-    *,
-    pecks: Pecks | None = None,
-    dwell: str = "",
-    feeds_out: bool = False,
-) -> None:
-    """Drill a hole: from a place above it to its bottom and back.
-
-    Out, and down again where the hole is there already, it goes in rapids.
-
-    Parameters
-    ----------
-    machine : Machine
-        Whose line is read; its feed is that of the cut.
-    above, bottom : (3,)
-        Where the feed begins, and the bottom [m].
-    axis : (3,)
-        From the bottom to above it.
-    pecks : Pecks, optional
-    dwell : str
-        What happens at the bottom, if anything.
-    feeds_out : bool
-        Whether it comes out at the feed, not faster.
-
-    Raises
-    ------
-    FileFormatError
-        The hole has no depth, or needs too many pecks.
-    """
-    depth = float((above - bottom) @ axis)
-    if not depth > 0.0:
-        raise machine.fault(
-            f"the hole ends {-1e3 * depth:.4g} mm above where it begins, expected a depth"
-        )
-    machine.rapid(above, axis)
-    done = 0.0
-    for reached in _depths(machine, depth, pecks):
-        if done > 0.0:
-            if pecks is not None and pecks.is_out:
-                machine.rapid(above, axis)
-            machine.rapid(above - max(0.0, done - _OFF) * axis, axis)
-        machine.cut(above - reached * axis, axis)
-        done = reached
-    if dwell:
-        machine.happens(dwell)
-    if feeds_out:
-        machine.cut(above, axis)
-    else:
-        machine.rapid(above, axis)
-    machine.ends_hole()
-
-
-def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
-    """Return how deep it is after each peck."""
-    if pecks is None:
-        return [depth]
-    if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _MAX_PECKS:
-        raise machine.fault(
-            f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
-        )
-    depths, here = list[float](), pecks.first
-    while here < depth - _SAME_POSE:
-        depths.append(here)
-        here += pecks.others
-    return [*depths, depth]

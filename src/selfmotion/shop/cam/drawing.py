@@ -16,7 +16,6 @@ from selfmotion.shop.cam.drawn_curves import DRAWN
 from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows, no_such_seam
 
 # Names of entities and attributes: https://ezdxf.mozman.at/docs/.
-
 # Annotations, which are no contours.
 _ANNOTATIONS = frozenset(
     ("TEXT", "MTEXT", "DIMENSION", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "ATTDEF")

@@ -10,17 +10,9 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array, lines_of
-from selfmotion.shop.cam.cuts import (
-    PRIME,
-    RETRACT,
-    STOPS,
-    Machine,
-    Pecks,
-    arc_points,
-    center_by_radius,
-    drill,
-    unit_axis,
-)
+from selfmotion.shop.cam.arcs import arc_points, center_by_radius
+from selfmotion.shop.cam.cuts import PRIME, RETRACT, STOPS, Machine, unit_axis
+from selfmotion.shop.cam.drilling import Pecks, drill
 from selfmotion.shop.cam.gcode_words import (
     bare_line,
     extrudes,

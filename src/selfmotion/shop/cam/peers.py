@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, is_number, lines_of, number_in, shown, text_of
-from selfmotion.shop.cam.cuts import Machine, arc_points
+from selfmotion.shop.cam.arcs import arc_points
+from selfmotion.shop.cam.cuts import Machine
 from selfmotion.shop.cam.pose_rows import PoseRows
 
 # Millimetre [m].
@@ -71,7 +72,6 @@ def _number(file: FilePath, line: int, text: str) -> float:
 
 
 # Arcs by a point between their ends.
-
 # Three points whose triangle is so flat lie on a line.
 _FLAT = 1e-6
 
@@ -111,7 +111,6 @@ def _turning(first: Array, last: Array, count: int) -> Array:
 
 
 # IRBCAM: x, y, z [mm], angles about z, y and z of the frame as it is turned [°], velocity [mm/s].
-
 _IRBCAM = ("x", "y", "z", "rz1", "ry", "rz2")
 
 
@@ -210,7 +209,6 @@ def _straight(
 
 
 # igus (Commonplace Robotics): X, Y, Z [mm] and A, B, C, of which only places are read.
-
 _IGUS = re.compile(
     r"X\s*[-+.,\dE]+\s*;\s*Y\s*[-+.,\dE]+\s*;\s*Z\s*[-+.,\dE]+\s*(?:;.*)?", re.IGNORECASE
 )
@@ -241,7 +239,6 @@ def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
 
 
 # Motion primitives of research code: breakpoints,primitives,points,q_bp, with arrays as texts.
-
 _PRIMITIVES = ("breakpoints", "primitives", "points")
 # Primitives → how many points each has.
 _POINTS = {"movej": 1, "movel": 1, "movec": 2}
@@ -281,7 +278,6 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
 
 
 # compas: frames by a point, an x axis and a y axis; print points of compas_slicer around them.
-
 _FRAME = ("point", "xaxis", "yaxis")
 # Names of a list of frames.
 _LISTS = ("frames", "data")

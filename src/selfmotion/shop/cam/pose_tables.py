@@ -43,7 +43,6 @@ _DEFAULT_HEADERS = {
 _ARRAY_COLUMNS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
 
 # Other spellings of names.
-
 # Units in brackets behind a title → what its name ends in.
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
 _BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
@@ -78,7 +77,6 @@ _GCODE_WORD = re.compile(r"[gmn][0-9]+|%")
 _SUGGESTED = ("feed", "roll", "pitch", "yaw", SEAM, EVENT)
 
 # Units.
-
 # Ending of a name → the columns that may have it, and the unit [m]; None for degrees.
 _UNITS = {
     "_mm": ((*_POSITION, "feed"), 1e-3),

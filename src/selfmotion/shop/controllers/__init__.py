@@ -25,8 +25,10 @@ from selfmotion.shop.controllers.motions import (
     motion_notes as motion_notes,
     motion_of_program as motion_of_program,
     read_motion as read_motion,
-    read_parts as read_parts,
     write_motion as write_motion,
+)
+from selfmotion.shop.controllers.part_motions import (
+    read_parts as read_parts,
     write_parts as write_parts,
 )
 from selfmotion.shop.controllers.program_draft import (

@@ -12,9 +12,9 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
+from selfmotion.shop.controllers.controller_axes import Axis
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
-from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.segments import (
     NO_DEVIATION,
     Deviations,

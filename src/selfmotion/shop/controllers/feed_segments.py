@@ -13,11 +13,9 @@ from typing_extensions import override
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, times_when
+from selfmotion.shop.controllers.arcs import put_on_arcs, step_lengths
 from selfmotion.shop.controllers.segments import Curve, Knots, PoseSegment, finer, straight
-from selfmotion.shop.controllers.steps import put_on_arcs, step_lengths
 from selfmotion.shop.controllers.tool_frames import ToolFrames
-
-# Length of path that a tool has passed, as a function of time, and its inverse.
 
 # Times at which speeds are evaluated, per interval between two samples.
 _BETWEEN = 4

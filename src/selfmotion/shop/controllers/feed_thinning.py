@@ -15,6 +15,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.arcs import arc_through, step_lengths
 from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_texts import TIMES_HEADING
@@ -27,14 +28,7 @@ from selfmotion.shop.controllers.segments import (
     aligned_quaternions,
     by_interpolation,
 )
-from selfmotion.shop.controllers.steps import (
-    Allowed,
-    SampledPoses,
-    Steps,
-    StepSearch,
-    arc_through,
-    step_lengths,
-)
+from selfmotion.shop.controllers.steps import Allowed, SampledPoses, Steps, StepSearch
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import Operation, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames

@@ -48,9 +48,6 @@ UNBOUND_TURNING = 400.0
 WHOLE = 100.0
 
 
-# Values in statements: aggregates of axes, poses and frames.
-
-
 def _values(reader: ProgramReader, text: str) -> dict[str, float]:
     """Return the numbers of an aggregate by their names."""
     values: dict[str, float] = {}

@@ -13,11 +13,8 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.problem.constraints import Constraint
-from selfmotion.shop.controllers.program_settings import (
-    ProgramSettings,
-    flange_of,
-    tool_from_flange,
-)
+from selfmotion.shop.controllers.controller_axes import flange_of, tool_from_flange
+from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.program_texts import TOLERANCE_HEADING, plain
 
 # Beginnings of comments that state these facts.

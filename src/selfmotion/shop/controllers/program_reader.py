@@ -10,12 +10,12 @@ import numpy as np
 from selfmotion.basics import FileFormatError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
+from selfmotion.shop.controllers.controller_axes import Axis
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.shop.controllers.feed_segments import Ramps, times_at
 from selfmotion.shop.controllers.program_comments import Comments
 from selfmotion.shop.controllers.program_facts import Load
 from selfmotion.shop.controllers.program_lines import Lines
-from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.program_texts import DURATION_HEADING
 from selfmotion.shop.controllers.segment_building import Pose, ProgramFrames, Row, SegmentBuilder
 from selfmotion.shop.controllers.statements import Language

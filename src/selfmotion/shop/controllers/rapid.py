@@ -51,9 +51,6 @@ APPROACH_TURNING = 100.0
 TURNING = (500.0, 5000.0, 1000.0)
 
 
-# Values in statements: lists of numbers in brackets.
-
-
 def _texts(reader: ProgramReader, text: str, count: int, what: str) -> list[str]:
     values = text.strip("[] ").split(",")
     if len(values) != count:

@@ -232,8 +232,6 @@ def for_cubics(motion: Trajectory) -> Trajectory:
     return motion
 
 
-# Motions that begin or end while the arm moves: no controller takes one unasked.
-
 # Speed below which a joint rests, as certificates judge it [rad/s or m/s].
 _REST = 1e-6
 

@@ -8,8 +8,10 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Flags, RobotError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
+from selfmotion.shop.controllers.arcs import put_on_arcs
+from selfmotion.shop.controllers.controller_axes import Axis, tool_from_flange
 from selfmotion.shop.controllers.feed_segments import FeedSegment, times_at
-from selfmotion.shop.controllers.program_settings import Axis, ProgramSettings, tool_from_flange
+from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.segments import (
     PoseSegment,
     Segment,
@@ -17,7 +19,6 @@ from selfmotion.shop.controllers.segments import (
     finer,
     straight,
 )
-from selfmotion.shop.controllers.steps import put_on_arcs
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # Name in messages of inserted slow motions between the segments of a shifted program.

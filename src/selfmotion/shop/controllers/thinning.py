@@ -28,8 +28,6 @@ from selfmotion.shop.controllers.segments import (
 )
 from selfmotion.work.job import Program
 
-# Operations of a motion: seams, and moves through the air with room around them.
-
 # Largest deviation of a move through the air, however much room there is [m, rad].
 _ROOMY = Tolerance(5e-3, 5e-3)
 # Share of the room between bodies that is used: distances are found to a fiftieth.

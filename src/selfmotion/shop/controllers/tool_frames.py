@@ -9,13 +9,9 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.robot import Chain, RobotModel
 from selfmotion.model.task import SE3, Quaternion, rotation_vectors, skews
+from selfmotion.shop.controllers.controller_axes import Axis, tool_from_flange
 from selfmotion.shop.controllers.pose_numbers import Rounding
-from selfmotion.shop.controllers.program_settings import (
-    AXES,
-    Axis,
-    ProgramSettings,
-    tool_from_flange,
-)
+from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings
 from selfmotion.shop.controllers.work_objects import WORLD, WorkObject
 
 _JOINTS = 6

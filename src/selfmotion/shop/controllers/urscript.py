@@ -61,9 +61,6 @@ _UP = 1.001
 _LEAST = 1e-5
 
 
-# Values in statements: lists of numbers in brackets.
-
-
 def _six(reader: ProgramReader, text: str) -> list[float]:
     """Return the numbers in the innermost brackets of a text."""
     values = re.findall(r"\[([^\[\]]*)\]", text)[0].split(",")

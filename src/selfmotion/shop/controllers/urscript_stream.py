@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from selfmotion.basics import Array
 from selfmotion.model.robot import RobotModel
+from selfmotion.shop.controllers.controller_axes import tool_from_flange
 from selfmotion.shop.controllers.program_facts import held_in_words
-from selfmotion.shop.controllers.program_settings import ProgramSettings, tool_from_flange
+from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.program_texts import as_word, plain
 from selfmotion.shop.controllers.program_writer import event_text
 from selfmotion.shop.controllers.urscript import URSCRIPT, check_joints, joint_approach, payload

@@ -21,8 +21,6 @@ from selfmotion.problem.problem import Problem, along_other_paths
 from selfmotion.work.batch.items import LATE, Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
 
-# Whether a plan answers a request.
-
 
 def answers(plan: Plan, job: PlanRequest) -> bool:
     """Whether a plan is of the problem of a request, judged with its tolerance.
@@ -62,9 +60,6 @@ def _original(path: ToolPath) -> ToolPath:
     while isinstance(path, Retimed):
         path = path.original
     return path
-
-
-# The folder of a batch: a plan and a row for each problem, and ranked tables.
 
 
 class Folder:

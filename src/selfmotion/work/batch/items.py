@@ -13,8 +13,6 @@ from selfmotion.planning.result import Plan, files_of, identity_of, key_of, load
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import Problem, problem_to_dict
 
-# Items: problems with names, or the error of one that cannot be read.
-
 # The reason of what its deadline left without a verified motion.
 LATE = "deadline"
 # Arguments of `plan` besides the problem.
@@ -108,9 +106,6 @@ def problem_items(problems: list[Problem | PlanRequest], options: Mapping[str, A
         job = given if isinstance(given, PlanRequest) else PlanRequest(given, **options)
         items.append(Item(f"plan-{k:0{digits}d}", lambda job=job: job))  # type: ignore[misc]
     return items
-
-
-# Rows: results, as a table of the batch has them.
 
 
 @dataclass(frozen=True)

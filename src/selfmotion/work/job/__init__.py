@@ -10,11 +10,11 @@ from selfmotion.work.job.program import Program as Program, write_timetable as w
 from selfmotion.work.job.run import plan_job as plan_job
 from selfmotion.work.job.seam import (
     Seam as Seam,
-    Step as Step,
     are_opposite as are_opposite,
     backwards as backwards,
 )
 from selfmotion.work.job.specification import Specification as Specification
+from selfmotion.work.job.step import Step as Step
 from selfmotion.work.job.work import problem_of_seam as problem_of_seam
 
 __all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

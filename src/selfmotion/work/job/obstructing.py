@@ -11,7 +11,8 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.planning.result import Move, Plan
 from selfmotion.work.job.ordering import Ordering
 from selfmotion.work.job.program import Program
-from selfmotion.work.job.seam import Seam, Step
+from selfmotion.work.job.seam import Seam
+from selfmotion.work.job.step import Step
 from selfmotion.work.job.work import JobSettings, Work, seam_steps
 
 # Tries to find another motion of a seam.

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Ints, obey_interruption
+from selfmotion.work.job.feasible_order import feasible_order
 from selfmotion.work.job.kernels import Tables, swept
-from selfmotion.work.job.stops import NO_ROUND, Round, Stops, along, feasible_order
+from selfmotion.work.job.stops import NO_ROUND, Round, Stops, along
 
 # Local search for many stops: 2-opt and or-opt.
 #

@@ -24,8 +24,8 @@ from selfmotion.planning.result import (
 )
 from selfmotion.problem.constraints import Clearance
 from selfmotion.work.job.program_files import write_program
-from selfmotion.work.job.seam import Step, same_body
 from selfmotion.work.job.specification import Specification
+from selfmotion.work.job.step import Step, same_body
 
 # Events may be outside their step by rounding [s].
 _ROUNDING = 1e-9
@@ -266,9 +266,6 @@ class Program:
 
 # Names in a printed program.
 _SHOWN = 12
-
-
-# The times of steps and events, as a table.
 
 
 def write_timetable(program: Program, file: str | Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from selfmotion.planning.result import (
     write_bundle,
 )
-from selfmotion.work.job.seam import Step
+from selfmotion.work.job.step import Step
 
 if TYPE_CHECKING:
     from selfmotion.work.job.program import Program

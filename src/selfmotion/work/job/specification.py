@@ -24,7 +24,8 @@ from selfmotion.planning.result import (
 )
 from selfmotion.problem.constraints import Clearance, Constraint, as_clearances
 from selfmotion.problem.costs import cost_from_dict
-from selfmotion.work.job.seam import JOB_END, JOB_START, Seam, Step, one_way, reversing
+from selfmotion.work.job.seam import JOB_END, JOB_START, Seam, one_way, reversing
+from selfmotion.work.job.step import Step
 
 # Times are the same up to rounding [s].
 _ROUNDING = 1e-9

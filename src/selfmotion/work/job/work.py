@@ -45,8 +45,10 @@ from selfmotion.problem.problem import (
     problem_from_dict,
     problem_to_dict,
 )
-from selfmotion.work.job.files import EarlierProgram, ResultCache, adapted_waypoints, satisfies
-from selfmotion.work.job.seam import Seam, Step, backwards
+from selfmotion.work.job.earlier_program import EarlierProgram, adapted_waypoints
+from selfmotion.work.job.files import ResultCache, satisfies
+from selfmotion.work.job.seam import Seam, backwards
+from selfmotion.work.job.step import Step
 
 # Clearances that are kept in memory: of a seam, and of the moves around it.
 _CACHED_CLEARANCES = 8
@@ -434,9 +436,6 @@ def _unpacked(data: bytes, load: Any, arms: dict[str, Any]) -> Any:
         file = Path(folder, "result.npz")
         file.write_bytes(data)
         return load(file, known=arms)
-
-
-# The steps of a program for a seam.
 
 
 def seam_steps(

@@ -1,0 +1,267 @@
+"""TOML, JSON and YAML files as nested tables, with SI units."""
+
+import json
+import math
+import tomllib
+from collections.abc import Collection, Hashable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics.errors import FileFormatError, nearest
+from selfmotion.basics.files import write_text
+from selfmotion.basics.inputs import TURN, is_number
+
+# Keys with a number for each joint.
+_RATES = ("deceleration", "limit", "offset")
+PER_JOINT = (*_RATES, "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
+# Keys that may end in _deg or _mm: nothing else is an angle or a length, or a rate of one.
+_BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
+# Values above a turn are in degrees.
+_WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
+_TURNS = (*_WITHIN_A_TURN, "lead", "tilt", "margin", "turn_acceleration", "turn_rate", "within")
+ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
+_SIZES = ("length", "lift", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
+_WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
+LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
+# Former name of `clearance`.
+FORMER_CLEARANCE = "collision"
+# Largest depth of nested tables or lists; real files have less than ten.
+_DEEPEST = 50
+_SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
+# Tables of joints with angles.
+_TABLES_OF_NUMBERS = tuple(f"{name}_deg" for name in PER_JOINT)
+# Similarity at which an unknown key is taken for a known one.
+_ALIKE = 0.8
+# Rows of relaxations, of position …
+_MOVED = ("x", "y", "z")
+# … and of rotation.
+_TURNED = ("rx", "ry", "rz")
+# Tables whose numbers have no unit.
+_UNITLESS = ("optimiser.",)
+# Keys that are shares there, of a feed.
+_SHARES = ("path.within",)
+# A margin is a share …
+_MARGIN = "margin"
+# … but of limits of position an angle or a length.
+_OF_POSITIONS = "JointPositionLimits"
+
+
+def read_document(file: Path) -> dict[str, Any]:
+    """Read a table from a .toml, .json, .yaml or .yml file, units as they are.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is not of the kind that its suffix says, or holds no table.
+    """
+    found = read_values(file)
+    if not isinstance(found, dict):
+        raise FileFormatError(f"{file}: holds a {type(found).__name__}, expected a table of keys")
+    return found
+
+
+def read_values(file: Path) -> Any:
+    """Read a table, or a list; see `read_document`."""
+    try:
+        found = _parse(file, file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{file}: is not UTF-8 text: {error}") from error
+    level = [found]
+    for _ in range(_DEEPEST):
+        inner = [list(item.values()) if isinstance(item, dict) else item for item in level]
+        level = [value for item in inner if isinstance(item, list) for value in item]
+        level = [item for item in level if isinstance(item, dict | list)]
+    if level:
+        raise FileFormatError(f"{file}: more than {_DEEPEST} tables or lists lie in each other")
+    return found
+
+
+def _parse(file: Path, text: str) -> Any:
+    match file.suffix:
+        case ".toml":
+            try:
+                return tomllib.loads(text)
+            except (ValueError, RecursionError) as error:
+                raise FileFormatError(f"{file}: is not TOML: {error}") from error
+        case ".json":
+            try:
+                return json.loads(text, object_pairs_hook=_without_twins)
+            except (ValueError, RecursionError) as error:
+                raise FileFormatError(f"{file}: is not JSON: {error}") from error
+        case ".yaml" | ".yml":
+            return _parse_yaml(file, text)
+    raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml, .json or .yaml")
+
+
+def _parse_yaml(file: Path, text: str) -> Any:
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+    class Loader(loader):  # type: ignore[misc, valid-type]  # its base is known when it runs
+        """Safe loader without duplicate keys and aliases."""
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            keys = [self.construct_object(key) for key, _ in node.value]
+            _without_twins([(key, None) for key in keys if isinstance(key, Hashable)])
+            return super().construct_mapping(node, deep=deep)
+
+    try:
+        _check_events(file, yaml.parse(text, Loader=loader))
+        # `ros2 topic echo` ends each message with a line of its own.
+        return next(iter(yaml.load_all(text, Loader=Loader)), None)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise FileFormatError(f"{file}: is not YAML: {' '.join(str(error).split())}") from error
+
+
+def _without_twins(pairs: list[tuple[Any, Any]]) -> dict[Any, Any]:
+    """Return a table of its keys and values; ValueError if a key is there twice."""
+    table: dict[Any, Any] = {}
+    for key, value in pairs:
+        if key in table:
+            raise ValueError(f"key '{key}' is given twice; keep one")
+        table[key] = value
+    return table
+
+
+def _check_events(file: Path, events: Iterable[Any]) -> None:
+    """Refuse events of a small file that would exhaust memory, before anything is built."""
+    import yaml
+
+    depth = 0
+    for event in events:
+        mark: Any = event.start_mark
+        if isinstance(event, yaml.AliasEvent):
+            raise FileFormatError(
+                f"{file}: line {mark.line + 1}: '*{event.anchor}' stands for something "
+                f"else, expected it written out"
+            )
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise FileFormatError(
+                f"{file}: line {mark.line + 1}: more than {_DEEPEST} tables or lists "
+                f"lie in each other"
+            )
+
+
+def write_document(file: Path, document: Mapping[str, Any]) -> None:
+    """Write a table as .toml, .json or .yaml, whichever the suffix says; atomically."""
+    match file.suffix:
+        case ".toml":
+            import tomli_w
+
+            text = tomli_w.dumps(_without_null(document))
+        case ".json":
+            text = json.dumps(document, indent=1) + "\n"
+        case ".yaml" | ".yml":
+            import yaml
+
+            dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+            text = yaml.dump(document, Dumper=dumper, sort_keys=False, default_flow_style=None)
+        case _:
+            raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml or .json")
+    write_text(file, text)
+
+
+def _without_null(value: Any) -> Any:
+    """Return a value as TOML can hold it: without keys of JSON's null, which count as absent."""
+    if isinstance(value, Mapping):
+        return {key: _without_null(item) for key, item in value.items() if item is not None}
+    return [_without_null(item) for item in value] if isinstance(value, list) else value
+
+
+def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+    """Return a table with keys ``NAME_deg`` [°] and ``NAME_mm`` [mm] as ``NAME`` [rad], [m].
+
+    JSON's null counts as a key that is not there.
+
+    Raises
+    ------
+    FileFormatError
+        A key with such an ending is no angle or length, is given twice, or holds no numbers; or an
+        angle in radians is more than a turn.
+    """
+    found: dict[str, Any] = {}
+    _check_rows(table, where)
+    for key, value in table.items():
+        if value is None:
+            continue
+        name, factor = key, None
+        for suffix, (allowed, scale) in _SUFFIXES.items():
+            if key.endswith(suffix):
+                name, factor = key.removesuffix(suffix), scale
+                _check_unit(name, suffix, where, allowed, table.get("kind"))
+        if name in found:
+            raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
+        inner = _inner(value, f"{where}{name}")
+        if factor is None:
+            _check_radians(name, inner, where)
+        found[name] = inner if factor is None else _scaled(inner, factor, f"{where}{key}")
+    return found
+
+
+def is_share(key: str, kind: object) -> bool:
+    """Whether a key has no unit in a table of some kind, though it has one in others."""
+    is_margin = key.rpartition(".")[2] == _MARGIN
+    return key.endswith(_SHARES) or (is_margin and kind != _OF_POSITIONS)
+
+
+def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str], kind: object) -> None:
+    """Refuse a key that is none, or has no such unit in a table of some kind."""
+    share = is_share(f"{where}{name}", kind)
+    if name in allowed and not where.startswith(_UNITLESS) and not share:
+        return
+    what = "angle" if suffix == "_deg" else "length"
+    near = nearest(name + suffix, [each + suffix for each in allowed], _ALIKE)
+    if near and name not in allowed:
+        raise FileFormatError(f"{where}{name}{suffix}: unknown key{near}")
+    known = "" if name in allowed else f", expected one of: {', '.join(sorted(allowed))}"
+    known = ", it is a share here, without a unit" if share else known
+    raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}{known}")
+
+
+def _check_rows(table: Mapping[str, Any], where: str) -> None:
+    """Refuse a band in mm of rows that turn, and one in degrees of rows that do not."""
+    rows = table.get("rows")
+    several = [rows] if isinstance(rows, str) else rows if isinstance(rows, list) else []
+    for row in several:
+        turns = row in _TURNED
+        wrong, right = ("_mm", "_deg") if turns else ("_deg", "_mm")
+        if f"band{wrong}" in table and (turns or row in _MOVED):
+            what = "an angle" if turns else "a length"
+            raise FileFormatError(f"{where}band{wrong}: row '{row}' is {what}; say band{right}")
+
+
+def _check_radians(name: str, value: Any, where: str) -> None:
+    """Refuse an angle in radians that can only be meant in degrees."""
+    if name not in _WITHIN_A_TURN:
+        return
+    for item in value if isinstance(value, list) else [value]:
+        if isinstance(item, int | float) and TURN < abs(item) < math.inf:
+            raise FileFormatError(
+                f"{where}{name}: {item:g} rad is more than a turn; in degrees say {name}_deg"
+            )
+
+
+def _inner(value: Any, where: str) -> Any:
+    if isinstance(value, Mapping):
+        return in_si(value, f"{where}.")
+    if isinstance(value, list):
+        return [_inner(item, f"{where}[{k}]") for k, item in enumerate(value)]
+    return value
+
+
+def _scaled(value: Any, factor: float, where: str) -> Any:
+    if isinstance(value, list):
+        return [_scaled(item, factor, where) for item in value]
+    if isinstance(value, dict) and where.endswith(_TABLES_OF_NUMBERS):
+        return {key: _scaled(item, factor, where) for key, item in value.items()}
+    if not is_number(value):
+        raise FileFormatError(f"{where}: is {value!r}, expected numbers")
+    try:
+        return value * factor
+    except OverflowError:
+        raise FileFormatError(f"{where}: is {value!r}, expected finite numbers") from None
