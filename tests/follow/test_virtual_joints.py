@@ -16,6 +16,7 @@ from selfmotion.model.follow import (
     deviation_of,
     has_windows,
     window_edges,
+    windows_shut,
     with_tolerances,
 )
 from selfmotion.model.motion import Sampling
@@ -116,6 +117,70 @@ def test_joints_stand_still_outside_of_windows() -> None:
     assert told == [tilt, tilt, set(), {"relaxed x"}, {"relaxed x"}]
     assert has_windows(follows)
     assert window_edges(follows) == (1.0, 2.0)
+
+
+def test_integrated_motions_hold_what_any_window_shuts_and_no_more() -> None:
+    robot = robot_named("panda")
+    path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
+    relaxations = [R("x", 0.1, during=(1.0, 4.0)), R("y", 0.1, during=(0.0, 3.0)), R("z", 0.1)]
+    follows = with_tolerances(Follows.of(robot, path, "pose"), relaxations)
+    assert follows.virtual.windowed.tolist() == [True, True, False]
+    shut = windows_shut(follows)
+    at_home = shut.items[0].chain.kinematics()
+    at_home.refresh(np.append(PANDA_HOME, np.zeros(3)))
+    np.testing.assert_array_equal(at_home.jacobian[:3, 7:], np.diag([0.0, 0.0, -0.1]))
+    always = with_tolerances(Follows.of(robot, path, "pose"), [R("z", 0.1)])
+    assert not has_windows(always)
+
+
+def test_two_hinges_tilt_a_pointing_tool_and_three_one_that_must_not_twist() -> None:
+    robot = robot_named("panda")
+    path, cone = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0), [R(("rx", "ry"), 0.3)]
+    rows = {
+        task: len(with_tolerances(Follows.of(robot, path, task), cone).items[0].chain.table)
+        for task in ("pointing", "pose")
+    }
+    assert rows == {"pointing": len(robot.chain.table) + 2, "pose": len(robot.chain.table) + 3}
+
+
+@pytest.mark.parametrize("task", ["pose", "pointing"])
+def test_small_tilts_deviate_as_smoothly_as_large_ones(task: str) -> None:
+    """Near 0 by a series, whose fourth power is left out: 1e-8 of the curvature at 0.01 rad."""
+    robot = robot_named("panda")
+    path, cone = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0), R(("rx", "ry"), 1.0)
+    virtual = with_tolerances(Follows.of(robot, path, task), [cone]).virtual
+    s = np.random.default_rng(0).uniform(-0.004, 0.004, (20, 2))
+    exact = differences(lambda x: virtual.rows_of(cone, x)[0], s, 1e-5)
+    # Differences over 1e-5 round by 1e-13; a wrong series is off by 1e-6.
+    np.testing.assert_allclose(virtual.rows_of(cone, s)[1], exact, atol=1e-11)
+    # Where the series ends, a tilt about one axis has the same slopes on both of its sides.
+    end = 0.01 / (0.5 if task == "pose" else 1.0)
+    sides = [virtual.rows_of(cone, np.array([[end + aside, 0.0]]))[1] for aside in (-1e-9, 1e-9)]
+    np.testing.assert_allclose(*sides, atol=5e-11)
+
+
+def test_where_home_is_not_known_the_middle_of_the_limits_is_usual() -> None:
+    robot = robot_named("z1")
+    pose = robot.pose(robot.dexterous_configuration(sm.Task.POSITION))
+    follows = Follows.of(robot, sm.paths.Dwell(pose, 4.0), "position")
+    middle = 0.5 * (robot.lower + robot.upper)
+    np.testing.assert_allclose(follows.coordinates.usual(), middle)
+    more = with_tolerances(follows, [R("z", 0.1)]).coordinates
+    np.testing.assert_allclose(more.usual(), np.append(middle, 0.0))
+
+
+def test_rows_are_limited_one_by_one_only_where_a_band_of_several_implies_it() -> None:
+    robot = robot_named("panda")
+    path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
+    # One row with another band in another window: no limit of the joint says both.
+    one = [R("x", 0.1, during=(0.0, 2.0)), R("x", 0.2, during=(2.0, 4.0))]
+    follows = with_tolerances(Follows.of(robot, path, "pose"), one)
+    assert all(RowWithinBand.of_row(item, follows) is None for item in one)
+    assert all(RowWithinBand.of_each(item, follows) is None for item in one)
+    # Rows that are free at some time have no limits at all.
+    free = [R(("x", "y"), 0.1, during=(0.0, 2.0)), R(("x", "y"), during=(2.0, 4.0))]
+    follows = with_tolerances(Follows.of(robot, path, "pose"), free)
+    assert RowWithinBand.of_each(free[0], follows) is None
 
 
 def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:

@@ -118,11 +118,8 @@ def has_windows(follows: Follows) -> bool:
 
 def windows_shut(follows: Follows) -> Follows:
     """Return the same with those coordinates held at 0 at all times, for integrated motions."""
-    if not has_windows(follows):
-        return follows
     none = np.zeros(follows.robot.dof, dtype=np.bool_)
     held = np.append(none, follows.virtual.windowed)
-
     items = (
         replace(item, chain=cast(ExtendedChain, item.chain).with_held(held))
         for item in follows.items

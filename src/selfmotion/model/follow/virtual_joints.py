@@ -125,8 +125,8 @@ class VirtualJoints:
     def windowed(self) -> Flags:
         """Mask of joints that are held at some time, (v,)."""
         ends = {x for item in self.relaxations for x in item.window(self._duration)}
-        times = np.array(sorted(ends | {0.0, self._duration}))
-        return np.asarray(self.held(times).any(axis=0))
+        # Where a window begins or ends later or earlier than the motion, its joints are held.
+        return np.asarray(self.held(np.array(sorted(ends))).any(axis=0))
 
     @cached_property
     def at_zero(self) -> Flags:
