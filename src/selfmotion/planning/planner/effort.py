@@ -138,3 +138,8 @@ class Effort:
     counts: Counts
     apart: bool = False
     decomposed: bool = False
+
+    @property
+    def keeps_conditions(self) -> bool:
+        """Whether all conditions are kept; the published method keeps given ends alone."""
+        return self.optimizer is None

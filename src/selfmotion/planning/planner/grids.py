@@ -35,7 +35,7 @@ def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:
     """Whether a formulation is optimised on nodes: by default, if it has a self-motion."""
     follows = formulation.follows
     free = follows.redundancy == follows.dof - follows.dimension > 0
-    return free and effort.optimizer is None
+    return free and effort.keeps_conditions
 
 
 def most_nodes(formulation: Formulation) -> int:

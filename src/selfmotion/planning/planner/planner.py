@@ -101,12 +101,9 @@ class Planner:
 
     @property
     def is_unmet(self) -> bool:
-        """Whether no motion so far satisfies all its constraints.
-
-        Of the published method's, these are given ends alone.
-        """
-        published = self.effort.optimizer is not None
-        return self.incumbent is None or not (published or self.incumbent.will_do)
+        """Whether no motion so far satisfies all constraints that are kept."""
+        best = self.incumbent
+        return best is None or (self.effort.keeps_conditions and not best.will_do)
 
     def guess(
         self,

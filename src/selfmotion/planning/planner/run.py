@@ -79,7 +79,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
             check,
             ending=part.ending,
             notes=planner.notes,
-            published=planner.effort.optimizer is not None,
+            published=not planner.effort.keeps_conditions,
         ),
         seconds=time.perf_counter() - planner.began,
         gap=_gap(planner, judged),

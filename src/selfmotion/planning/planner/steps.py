@@ -348,7 +348,7 @@ def _find_obstruction(planner: Planner) -> bool:
     judged, formulation = planner.judged, planner.formulation
     if judged is None or judged.certificate.verified or judged.part.solution.cut_short:
         return False
-    if planner.effort.optimizer is not None:
+    if not planner.effort.keeps_conditions:
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
