@@ -159,6 +159,22 @@ def test_small_tilts_deviate_as_smoothly_as_large_ones(task: str) -> None:
     np.testing.assert_allclose(*sides, atol=5e-11)
 
 
+def test_a_twist_by_more_than_half_a_turn_deviates_as_the_one_back_does() -> None:
+    """The rotation is the same: its vector is the one below half a turn, and so are its slopes."""
+    robot = robot_named("xarm7")
+    path = sm.paths.Dwell(robot.pose(robot.dexterous_configuration()), 4.0)
+    band = R(("rx", "ry", "rz"), 4.0)
+    virtual = with_tolerances(Follows.of(robot, path, "pose"), [band]).virtual
+    names = [joint.name for joint in virtual.each]
+    turn = 2.0 * np.pi / virtual.each[names.index("relaxed rz")].scale
+    s = np.random.default_rng(0).uniform(-0.4, 0.4, (10, 3))
+    s[:, names.index("relaxed rz")] += 0.6 * turn
+    back = s.copy()
+    back[:, names.index("relaxed rz")] -= turn
+    for ahead, behind in zip(virtual.rows_of(band, s), virtual.rows_of(band, back), strict=True):
+        np.testing.assert_allclose(ahead, behind, atol=ROUNDING)
+
+
 def test_where_home_is_not_known_the_middle_of_the_limits_is_usual() -> None:
     robot = robot_named("z1")
     pose = robot.pose(robot.dexterous_configuration(sm.Task.POSITION))

@@ -302,8 +302,11 @@ def _samples(velocity: Callable[[float], npt.ArrayLike], times: Array) -> Array:
     given = [copy(velocity(t)) for t in times.tolist()]
     # Thousands of samples are checked at once; one of several kinds, or a bad one, by itself.
     values = plain_numbers(given)
-    if values is not None and values.shape == (len(times), 6) and np.isfinite(values).all():
-        return values
+    if values is not None and np.isfinite(values).all():
+        if values.shape == (len(times), 6):
+            return values
+        if values.shape == (len(times), 3):
+            return np.hstack([values, np.zeros_like(values)])
     return np.array([_as_twist(value, t) for value, t in zip(given, times, strict=True)])
 
 
