@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.shop.cam import cuts
+from selfmotion.shop.cam import arcs
 from selfmotion.shop.cam.peers import _arc
 
 # Of centres that follow from points by products of their distances.
@@ -35,7 +35,7 @@ def test_an_arc_through_three_points_is_on_their_circle(seed: int) -> None:
     assert (steps > 0.0).all()
     assert steps.sum() == pytest.approx(last)
     sagitta = radius * (1.0 - np.cos(0.5 * steps))
-    assert sagitta.max() <= cuts._CHORD_TOLERANCE * (1.0 + ROUNDING)
+    assert sagitta.max() <= arcs._CHORD_TOLERANCE * (1.0 + ROUNDING)
 
 
 def test_three_points_on_a_line_are_a_line() -> None:

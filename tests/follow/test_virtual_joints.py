@@ -13,6 +13,7 @@ from selfmotion.certificate import deviation_from
 from selfmotion.model.follow import (
     Follows,
     band_limits,
+    completed,
     deviation_of,
     has_windows,
     window_edges,
@@ -175,6 +176,24 @@ def test_a_twist_by_more_than_half_a_turn_deviates_as_the_one_back_does() -> Non
         np.testing.assert_allclose(ahead, behind, atol=ROUNDING)
 
 
+def test_of_several_paths_the_first_one_says_how_far_the_tool_is_off() -> None:
+    hands = "left/panda_hand_tcp", "right/panda_hand_tcp"
+    aside = pin.SE3(np.eye(3), np.array([0.0, 1.0, 0.0]))
+    robot = sm.load_robot({"left": "panda", "right": "panda"}, base={"right": aside}, tool=hands)
+    q = np.append(PANDA_HOME, PANDA_HOME)
+    panda = robot_named("panda").pose(PANDA_HOME)
+    below = pin.SE3(panda.rotation, panda.translation - [0.0, 0.0, 0.02])
+    items = [
+        sm.Follow(sm.paths.Dwell(below, 4.0), tool=hands[0]),
+        sm.Follow(sm.paths.Dwell(aside * panda, 4.0), tool=hands[1]),
+    ]
+    band = R("z", 0.05)
+    problem = sm.Problem(robot, items, relaxations=[band])
+    follows = Formulation.of(problem).follows
+    z = completed(follows, np.zeros(1), q[None])
+    np.testing.assert_allclose(deviation_of(follows, band, z), [[0.02]], atol=ROUNDING)
+
+
 def test_where_home_is_not_known_the_middle_of_the_limits_is_usual() -> None:
     robot = robot_named("z1")
     pose = robot.pose(robot.dexterous_configuration(sm.Task.POSITION))
@@ -205,6 +224,10 @@ def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:
     pairs = [R("rx", 0.1, (0.0, 2.0)), R("ry", 0.1), R("rz", 0.1, (2.5, 4.0))]
     with pytest.raises(sm.errors.ProblemError, match="two and another two"):
         sm.Problem(robot, path, start=PANDA_HOME, relaxations=pairs)
+    # One pair, and all three at other times, is none of these.
+    alone = [R("rx", 0.1), R("ry", 0.1), R("rz", 0.1, (0.0, 2.0))]
+    follows = with_tolerances(Follows.of(robot, path, "pose"), alone)
+    assert [joint.name for joint in follows.virtual.each] == ["relaxed rz", "tilt rx", "tilt ry"]
 
 
 def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_arm() -> None:
