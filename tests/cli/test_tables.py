@@ -113,7 +113,8 @@ def test_plans_are_compared_by_costs_that_the_shell_names(tmp_path: Path) -> Non
     files = [tmp_path / "plan.npz", tmp_path / "slower.npz"]
     for one, file in zip((plan, slower), files, strict=True):
         one.save(file)
-    asked = ("--cost", "JointVelocity", "--cost", "JointAcceleration=0.1")
+    costs_of = 'costs=[{kind="JointVelocity"}, {kind="JointAcceleration", weight=0.1}]'
+    asked = ("--set", costs_of)
     code, text = invoke("compare", *files, *asked, "--json")
     assert code == 0
     told = json.loads(text)
@@ -127,4 +128,5 @@ def test_plans_are_compared_by_costs_that_the_shell_names(tmp_path: Path) -> Non
     assert "joint acceleration" in text
     assert "total cost" in text
     assert "measured" not in invoke("compare", *files, "--json")[1]
-    assert "expected NAME or NAME=WEIGHT" in complaint("compare", *files, "--cost", "Nothing")
+    said = complaint("compare", *files, "--set", 'costs=[{kind="Nothing"}]')
+    assert "costs[0]: kind is 'Nothing'" in said

@@ -216,7 +216,7 @@ def _not_found(made: sm.Plan | sm.Move) -> sm.Move:
 def test_sheets_of_programs_from_the_shell(tmp_path: Path) -> None:
     file, page = tmp_path / "two.program", tmp_path / "sheet.html"
     two_seams().save(file)
-    code, told = invoke("sheet", file, "-o", page, "--part-number", "47", "--order-number", "8")
+    code, told = invoke("sheet", file, "-o", page, "--number", "part=47", "--number", "order=8")
     assert code == 0, told
     text = page.read_text()
     assert "part 47 · order 8" in text

@@ -24,7 +24,7 @@ from selfmotion.model.robot.xacro_expressions import only_arithmetic
 # paths of the machine that wrote a file, and relative paths: all are looked up here, in this
 # order, the nearest first:
 #
-# 1. folders that are given (``packages=``, ``--packages``), and three levels below them
+# 1. folders that are given (``packages=``), and three levels below them
 # 2. the folders above the file: one of that name, or whose ``package.xml`` says so, or one
 #    beside it
 # 3. ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below
@@ -86,7 +86,7 @@ class Packages:
         return (
             f"package '{name}' is in none of {given}{self.file.resolve().parent} and the folders "
             f"above it, {_BELOW} levels below the nearest of these, {known}; name the folder that "
-            f"has it: --packages DIR (packages=)"
+            f"has it: --set robot.packages=DIR (packages=)"
         )
 
     def called_otherwise(self, name: str, inside: str) -> str:
@@ -101,7 +101,7 @@ class Packages:
         return (
             f"package '{name}' is nowhere, but {folder} has {inside} and is called '{said}': "
             f"rename it, or link to it by that name (ln -s {folder} DIR/{name}) and give "
-            f"--packages DIR (packages=)"
+            f"--set robot.packages=DIR (packages=)"
         )
 
     @cached_property
@@ -431,7 +431,9 @@ class _Declared:
             f"{name} (no default)" if default is None else f'{name} (default "{default}")'
             for name, default in self.defaults.items()
         )
-        return f"its arguments: {listed}; give them with --argument NAME=VALUE (arguments=)"
+        return (
+            f"its arguments: {listed}; give them with --set robot.arguments.NAME=VALUE (arguments=)"
+        )
 
 
 @contextlib.contextmanager

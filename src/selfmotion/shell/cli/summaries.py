@@ -17,32 +17,38 @@ from selfmotion.work.job import Program
 
 if TYPE_CHECKING:
     from selfmotion.work.batch import Batch
+    from selfmotion.work.placement import Placement
 
 # Advice in messages of the library → the same with options of the shell.
 
 # As the library says it → as the shell does, in this order.
 _WORDS = (
     (r"take robot\.inverse_kinematics\(.*?\), task, seed=start\)", "give another --start"),
-    (r"\b(task|corners)='(\w+)'", r"--\1 \2"),
-    (r"\(?\brelaxations=\)?", "with --relax"),
-    (r"\b(tool|lock|start|acceleration|velocity|duration|feed)=(?=[\s;,.)]|$)", r"--\1"),
-    (r"give force=True to write it", "export --force writes it"),
-    (r"give a larger jump", "give a larger --jump"),
-    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or --duration (s)"),
+    (r"\btask='(\w+)'", r"--task \1"),
+    (r"\bcorners='(\w+)'", r"--set path.corners=\1"),
+    (r"\(?\brelaxations=\)?", "with relaxations (--set)"),
+    (r"\b(tool|start|feed)=(?=[\s;,.)]|$)", r"--\1"),
+    (r"\block=(?=[\s;,.)]|$)", "--set robot.lock.NAME=VALUE"),
+    (r"\bduration=(?=[\s;,.)]|$)", "--set path.duration=SECONDS"),
     (
-        r"so that (feed|duration) has no effect; drop one",
-        r"so that --\1 has no effect; drop it",
+        r"\b(acceleration|velocity)=(?=[\s;,.)]|$)",
+        lambda found: f"--set constraints.Joint{found[1].capitalize()}Limits.limit=NUMBER",
     ),
+    (r"give force=True to write it", "export --force writes it"),
+    (r"give a larger jump", "give a larger --set path.jump"),
+    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or path.duration (s)"),
+    (r"so that feed has no effect; drop one", "so that --feed has no effect; drop it"),
+    (r"so that duration has no effect; drop one", "so that path.duration has no effect; drop it"),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
     (r"\(Feed\.original\)", "(a duration in its place)"),
     (r"\(within=\)", "(--set path.within=0.5)"),
     (r"\((acceleration|turn_acceleration|turn_rate|within)=([0-9.e+]+)\)", r"(--set path.\1=\2)"),
-    (r"\bflip_normals\b", "--flip-normals"),
-    (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
-    (r"\brotary_(axes|center)\b", r"--rotary-\1"),
-    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--\1 "),
-    (r"raise max_evaluations", "raise --max-evaluations"),
-    (r"give columns \(", "give --columns ("),
+    (r"(?<!path\.)\bflip_normals\b", "--set path.flip_normals"),
+    (r"\b(rotary|unit) = '(\w+)'", r"--set path.\1=\2"),
+    (r"(?<!path\.)\brotary_(axes|center)\b", r"--set path.rotary_\1"),
+    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--set path.\1 "),
+    (r"raise max_evaluations", "raise --set max_evaluations"),
+    (r"give columns \(", "give --set path.columns ("),
     (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )
@@ -183,8 +189,8 @@ def _help_of(message: str) -> str:
     if found:
         return found + told.partition("; ")[0]
     return (
-        "what may help: another --start; a --task that prescribes less; --relax; the path "
-        "in another place (selfmotion place)"
+        "what may help: another --start; a --task that prescribes less; relaxations (--set); the "
+        "path in another place (selfmotion place)"
     )
 
 
@@ -261,6 +267,18 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
         "metres": dict(plan.metres),
         "certificate": certificate_json(plan.certificate, plan.approaches),
+    }
+
+
+def placement_json(placement: "Placement") -> dict[str, Any]:
+    """Return the best place, as JSON-safe values."""
+    return {
+        "of": placement.of,
+        "place": dict(placement.place),
+        "cost": placement.cost,
+        "cost_before": placement.cost_before,
+        "on_bounds": list(placement.on_bounds),
+        "verdicts": [plan.certificate.verdict for plan in placement.plans],
     }
 
 
