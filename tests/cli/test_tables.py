@@ -54,10 +54,10 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
 @pytest.mark.parametrize(
     ("amount", "allowed", "kept", "told"),
     [
-        (0.015, 0.0147, True, "at least 0.0147"),
-        (0.014, 0.0147, False, "at least 0.0147"),
-        (0.0, 1e-6, True, "1e-06 allowed"),
-        (0.1, 1e-6, False, "1e-06 allowed"),
+        (0.015, 0.0147, True, "at least 0.0147 m/s"),
+        (0.014, 0.0147, False, "at least 0.0147 m/s"),
+        (0.0, 1e-6, True, "1e-06 m/s allowed"),
+        (0.1, 1e-6, False, "1e-06 m/s allowed"),
     ],
 )
 def test_a_limit_is_told_with_its_side(
@@ -78,8 +78,8 @@ def test_a_limit_is_told_with_its_side(
 @pytest.mark.parametrize(
     ("unit", "amount", "allowed", "told"),
     [
-        ("rad/s²", 0.0075, 1e-3, "acceleration at rest (0.001 allowed)"),
-        ("rad/s", 2e-5, 1e-6, "speed at rest (1e-06 allowed)"),
+        ("rad/s²", 0.0075, 1e-3, "acceleration at rest (0.001 rad/s² allowed)"),
+        ("rad/s", 2e-5, 1e-6, "speed at rest (1e-06 rad/s allowed)"),
     ],
 )
 def test_what_moves_at_rest_is_told_with_its_unit(

@@ -36,6 +36,7 @@ from selfmotion.shell.cli.app import (
     terminal,
 )
 from selfmotion.shell.documents import MAYBE, example_texts, json_schema, parse_setting, set_key
+from selfmotion.shell.facts import certificate_facts, facts_of_program
 
 
 @app.command(
@@ -220,7 +221,8 @@ def check(
         judged = request.judged(display.stage)
     outputs.print_notes(judged.notes)
     if as_json:
-        data = summaries.certificate_json(judged.certificate, judged.near)
+        facts = certificate_facts(judged.certificate, judged.near, judged.arm)
+        data = summaries.certificate_json(judged.certificate, judged.near, facts)
         data["remarks"] = [*judged.notes, *data["remarks"]]
         print_json(data | checks.left_to_controller(judged.program))
     else:
@@ -235,11 +237,15 @@ def compare(
     settings: options.SetOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Compare plans: costs, durations, margins and verdicts, side by side.
+    """Compare plans: costs, durations, margins and verdicts, side by side; or programs.
 
     By --set costs=… all are measured by the same costs; by default each by those that it was made
     for.
     """
+    if all(file.suffix == jobs.PROGRAM for file in plans):
+        options.refuse({"set": settings}, plans[0], "the program's")
+        _compare_programs({str(file): sm.load_program(file) for file in plans}, as_json)
+        return
     saved = {str(file): sm.load_plan(file) for file in plans}
     costs = _common_costs(settings or [], next(iter(saved.values())))
     table = sm.compare(saved, costs=costs)
@@ -250,6 +256,15 @@ def compare(
         print_json(told)
     else:
         tables.show_comparison(table, terminal)
+
+
+def _compare_programs(programs: dict[str, sm.Program], as_json: bool) -> None:
+    """Print what is known of programs, side by side."""
+    if as_json:
+        print_json({name: summaries.program_json(each) for name, each in programs.items()})
+    else:
+        columns = {name: facts_of_program(each) for name, each in programs.items()}
+        tables.show_side_by_side(columns, terminal)
 
 
 def _common_costs(settings: list[str], plan: sm.Plan) -> list[sm.costs.Cost] | None:
@@ -353,9 +368,10 @@ def retime(
 ) -> None:
     """Retime a plan: the same joint path in the least time within limits."""
     outputs.check_suffixes(out or [])
+    planned = sm.load_plan(file)
     with StageDisplay(stages) as display:
         display.stage("retiming", 1, 1)
         a = options.one_or_each(acceleration, "--acceleration")
         v = options.one_or_each(velocity, "--velocity")
-        result = sm.retime(sm.load_plan(file), a, v, rate)
+        result = sm.retime(planned, a, v, rate)
     outputs.finish(result, out or [], html, as_json, verbose)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -13,6 +13,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.result import Plan
+from selfmotion.shell.facts import Fact, facts_of_program, plan_facts, with_unit
 from selfmotion.work.job import Program
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def show_certificate(
     _print(console, with_hint(in_shell(certificate.summary)), style)
     if approaches:
         name, nearest = min(approaches.items(), key=lambda item: item[1].value)
-        told = f"clearance {1e3 * nearest.value:.4g} mm at {nearest.time:.4g} s: {nearest.name}"
+        told = f"clearance {with_unit(nearest.value, 'm')} at {nearest.time:.4g} s: {nearest.name}"
         _print(console, told if name in nearest.name else f"{told} ({name})")
     count = len(certificate.remarks)
     if count:
@@ -234,13 +235,19 @@ def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
     }
 
 
-def certificate_json(certificate: Certificate, approaches: Mapping[str, Extreme]) -> dict[str, Any]:
-    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come."""
+def certificate_json(
+    certificate: Certificate, approaches: Mapping[str, Extreme], facts: Sequence[Fact]
+) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come.
+
+    The facts are what tables show, in SI.
+    """
     return {
         "verified": certificate.verified,
         "verdict": certificate.verdict,
         **dataclasses.asdict(certificate),
         "approaches": {name: dataclasses.asdict(near) for name, near in approaches.items()},
+        "facts": [item.to_dict() for item in facts],
     }
 
 
@@ -266,7 +273,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         },
         "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
         "metres": dict(plan.metres),
-        "certificate": certificate_json(plan.certificate, plan.approaches),
+        "certificate": certificate_json(plan.certificate, plan.approaches, plan_facts(plan)),
     }
 
 
@@ -306,4 +313,5 @@ def program_json(program: Program) -> dict[str, Any]:
         "events": [
             {"time": time, "seam": seam, "event": event} for time, seam, event in program.events
         ],
+        "facts": [item.to_dict() for item in facts_of_program(program)],
     }
