@@ -224,6 +224,17 @@ def test_commands_that_went_say_what_takes_their_place() -> None:
     assert "--x: --within x=-0.1,0.1; --path-alone: --of path" in said
 
 
+def test_an_example_takes_keys_of_the_arm_and_its_links_alone(tmp_path: Path) -> None:
+    out, links = tmp_path / "a.toml", "clearance.disabled=[['panda_link0', 'panda_link2']]"
+    given = ("--set", f"robot.packages={tmp_path}", "--set", links)
+    assert invoke("init", "panda", "--out", out, *given)[0] == 0
+    text = out.read_text()
+    assert '["panda_link0", "panda_link2"]' in text
+    assert 'packages = ["."]' in text
+    said = complaint("init", "panda", "--out", out, "--force", "--set", "path.duration=3")
+    assert "--set path: an example takes robot.lock, robot.arguments" in said
+
+
 def test_options_are_declared_once() -> None:
     """Each option that several commands share is one declaration, and all are few."""
     folder = Path(inspect.getfile(moved)).parent

@@ -169,6 +169,8 @@ def _of_example(settings: list[str]) -> dict[str, Any]:
                 f"--set {key}: an example takes {', '.join(_OF_EXAMPLE)}; change the file that is "
                 f"written"
             )
+    packages = of_robot.get("packages", [])
+    of_robot["packages"] = [packages] if isinstance(packages, str) else packages
     return {**of_robot, "clearance": clearance is not False, **of_links}
 
 
