@@ -340,9 +340,9 @@ def _row(bare: Row, description: Description, text: str) -> Row:
         problem = Path(name) / "arm.toml"
         words: list[str | Path] = [description.file, "--tool", bare.tool]
         for folder in folders:
-            words += ["--packages", folder]
+            words += ["--set", f"robot.packages={folder}"]
         for key, value in description.arguments:
-            words += ["--argument", f"{key}={value}"]
+            words += ["--set", f"robot.arguments.{key}={value}"]
         code, _, said = _selfmotion("init", *words, "--out", problem)
         if code:
             return replace(row, why=_shortened(said, description))

@@ -19,7 +19,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 PLAN = (
     "plan panda --path examples/seam.csv --frame 0.45,-0.1,0.35,0,0,0 --feed 0.05 "
-    "--task pointing --mu 0.01 --out seam.npz"
+    "--task pointing --set costs.InverseManipulability.mu=0.01 --out seam.npz"
 )
 COUNTED = """
 import runpy, sys

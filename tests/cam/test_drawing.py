@@ -65,7 +65,7 @@ def test_a_drawing_without_a_unit_is_refused_until_it_is_said(tmp_path: Path, nu
         first, last = path.evaluate(np.array([0.0, path.duration])).translation
         assert np.linalg.norm(last - first) == pytest.approx(length)
     line = refused("plan", "panda", "--path", tmp_path / "part.dxf", "--feed", "0.1")
-    assert "--unit mm" in line
+    assert "--set path.unit=mm" in line
 
 
 def test_a_unit_that_is_said_counts_more_than_that_of_the_file(tmp_path: Path) -> None:

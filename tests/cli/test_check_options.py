@@ -1,6 +1,5 @@
 """`check` answers each of its options for plans, too, or refuses it."""
 
-import inspect
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.shell.cli import app, commands, documents
+from selfmotion.basics import write_csv
+from selfmotion.shell.cli import app
 from selfmotion.shell.documents import example_text, plan_request_of
 from support.arms import robot_named
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_circle, on_line
 
 
 @pytest.fixture(scope="module")
@@ -26,26 +26,7 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["--robot", "ur5"],
-        ["--path", "nosuch.csv"],
-        ["--feed", "0.1"],
-        ["--task", "pose"],
-        ["--corners", "stop"],
-        ["--tool", "x"],
-        ["--reference", "x"],
-        ["--feed", "0"],
-        ["--seam", "a"],
-        ["--frame", "0,0,0,0,0,0"],
-        ["--columns", "x,y,z"],
-        ["--flip-normals"],
-        ["--lock", "a=1"],
-        ["--degrees"],
-        ["--no-self-collision"],
-    ],
-)
+@pytest.mark.parametrize("options", [["--robot", "ur5"], ["--degrees"]])
 def test_what_is_the_plans_own_is_refused(plan: Path, options: list[str]) -> None:
     said = complaint("check", plan, *options)
     assert f"{options[0]} is the plan's own" in said
@@ -90,9 +71,9 @@ def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> Non
     ("options", "words"),
     [
         ([], ""),
-        (["--velocity", "0.001"], "times its limit"),
-        (["--acceleration", "0.001"], "accelerates at"),
-        (["--clearance", "0.5"], "apart"),
+        (["--set", "constraints.JointVelocityLimits.limit=0.001"], "times its limit"),
+        (["--set", "constraints.JointAccelerationLimits.limit=0.001"], "accelerates at"),
+        (["--set", "clearance.distance=0.5"], "apart"),
         (["--tolerance", "1e-15"], "off the path"),
     ],
 )
@@ -106,8 +87,15 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
     rows = "0.05;0;0;0\n0.05;0.05;0;9\n0.05;0.1;0;9\n"
     file = tmp_path / "a.csv"
     file.write_text(rows)
-    typed = ["--path", file, "--columns", "x,y,z,-", "--frame", "0.4,-0.1,0.4,0,0,0"]
-    typed += ["--duration", "3", "--task", "position"]
+    typed = [
+        "--path",
+        file,
+        "--set",
+        'path.columns=["x", "y", "z", "-"]',
+        "--frame",
+        "0.4,-0.1,0.4,0,0,0",
+    ]
+    typed += ["--set", "path.duration=3", "--task", "position"]
     table = {"kind": "file", "file": str(file), "columns": ["x", "y", "z", "-"], "duration": 3.0}
     frame = {"frame": {"position": [0.4, -0.1, 0.4]}}
     document = {"task": "position", "start": "free", "path": table | frame}
@@ -118,7 +106,7 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
     assert found.exit_code == 0, found.output
     moved = [text.replace("0.4,-0.1", "0.4,-0.11") for text in run]
     assert CliRunner().invoke(app, moved).exit_code == 1
-    assert "names no seams, so that seam has no effect" in complaint(*run, "--seam", "a")
+    assert "names no seams, so that seam has no effect" in complaint(*run, "--set", "path.seam=a")
 
 
 def test_motions_made_elsewhere_are_judged_by_what_plan_keeps(tmp_path: Path) -> None:
@@ -143,27 +131,13 @@ def test_motions_made_elsewhere_are_judged_by_what_plan_keeps(tmp_path: Path) ->
     for what in ("accelerations", "jerks", "self-collision"):
         assert what in text
     assert "not checked" not in text
-    code, text = checked(2.0, "--no-self-collision")
+    code, text = checked(2.0, "--set", "clearance=false")
     assert code == 0
     assert "not checked: self-collision" in text
     # Too fast for the maker's accelerations, for a plan that asked for none.
     code, text = checked(0.5, constraints=())
     assert code == 1
     assert "accelerates at" in text
-
-
-def test_no_option_is_left_without_an_effect(plan: Path) -> None:
-    """Each is refused, or judged; --json, --verbose and help change what is printed."""
-    (command,) = (item for item in app.registered_commands if item.callback is commands.check)
-    names = set(inspect.signature(command.callback).parameters) - {"context", "file"}
-    names -= {"as_json", "verbose"}
-    refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
-    refused |= {"argument", "packages", "no_collision", *documents.OF_PATH}
-    judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
-    # What --disabled does is in tests/documents/test_cases.py.
-    judged |= {"disabled"}
-    # What a calibration does is in tests/robot/test_calibration.py.
-    assert names == refused | judged | {"tolerance", "calibration"}
 
 
 CELL = """
@@ -204,8 +178,14 @@ def test_a_motion_of_a_cell_is_judged_by_its_problem_file(tmp_path: Path) -> Non
     found = CliRunner().invoke(app, [*run, "--verbose"])
     assert found.exit_code == 0, found.output
     assert "tilt" in found.output
-    assert CliRunner().invoke(app, [*run, "--velocity", "0.001"]).exit_code == 1
-    assert "--task is the problem's own" in complaint(*run, "--task", "pose")
+    assert (
+        CliRunner()
+        .invoke(app, [*run, "--set", "constraints.JointVelocityLimits.limit=0.001"])
+        .exit_code
+        == 1
+    )
+    # What is asked besides counts as well.
+    assert CliRunner().invoke(app, [*run, "--set", "constraints.Tilt.within=0.01"]).exit_code == 1
     strict = file.read_text().replace("within = 3.1", "within = 0.01")
     file.write_text(strict)
     assert CliRunner().invoke(app, run).exit_code == 1
@@ -215,14 +195,14 @@ def test_obstacles_are_judged_with_a_plan(plan: Path, tmp_path: Path) -> None:
     at = robot_named("panda").pose(robot_named("panda").dexterous_configuration()).translation
     wall = [{"shape": "box", "name": "wall", "position": at.tolist(), "size": [0.2] * 3}]
     (tmp_path / "wall.json").write_text(json.dumps(wall))
-    options = ["--obstacles", str(tmp_path / "wall.json")]
+    options = ["--set", f"clearance.obstacles=@{tmp_path / 'wall.json'}"]
     assert CliRunner().invoke(app, ["check", str(plan), *options]).exit_code == 1
 
 
 @pytest.mark.parametrize("distance", ["nan", "-1"])
 def test_clearances_that_make_no_sense_are_refused(plan: Path, distance: str) -> None:
-    complaint("check", plan, "--clearance", distance)
-    complaint("plan", "panda", "--circle", "0.1", "--clearance", distance)
+    complaint("check", plan, "--set", f"clearance.distance={distance}")
+    complaint("plan", "panda", *on_circle("0.1"), "--set", f"clearance.distance={distance}")
 
 
 def test_a_windowed_relaxation_is_taken_from_the_shell() -> None:
@@ -247,17 +227,39 @@ def test_six_joints_with_a_window_and_a_free_start_are_planned() -> None:
 @pytest.mark.parametrize("name", ["seam.script", "seam.mod", "seam.src", "seam.csv"])
 def test_a_file_is_judged_by_the_plan_that_it_comes_from(tmp_path: Path, name: str) -> None:
     """By all that was asked for; and what is not that motion any more is not verified."""
-    line = "--line", "0.05,0,0", "--feed", "0.02", "--task", "pointing", "--no-self-collision"
+    line = (
+        *on_line("0.05,0,0", "feed=0.02"), "--task", "pointing", "--set", "clearance=false",
+    )  # fmt: skip
     kept, file = tmp_path / "plan.npz", tmp_path / name
-    assert invoke("plan", "ur5", *line, "--velocity", "2", "--out", kept)[0] == 0
-    of_program = () if name.endswith("csv") else ("--targets", "poses", "--mass", "2")
+    limit = "constraints.JointVelocityLimits.limit"
+    assert invoke("plan", "ur5", *line, "--set", f"{limit}=2", "--out", kept)[0] == 0
+    of_program = () if name.endswith("csv") else ("--set", "targets=poses", "--set", "mass=2")
     assert invoke("export", kept, "--out", file, *of_program)[0] == 0
     code, said = invoke("check", file, "--robot", kept)
     assert code == 0
     assert "verified at all times" in said
-    code, said = invoke("check", file, "--robot", kept, "--velocity", "1e-4", "--json")
+    code, said = invoke("check", file, "--robot", kept, "--set", f"{limit}=1e-4", "--json")
     assert code == 1
     assert "times its limit of 0.0001 rad/s" in json.loads(said)["verdict"]
-    assert "--path is the plan's own: leave it out" in complaint(
-        "check", file, "--robot", kept, "--path", file
-    )
+
+
+def test_an_arm_without_a_joint_to_spare_is_judged_all_the_same(tmp_path: Path) -> None:
+    """It is not planned, but its motion along a path of poses is checked."""
+    arm = robot_named("ur5")
+    start = arm.dexterous_configuration()
+    line, times = sm.paths.Line(arm.pose(start), arm.pose(start + 0.02), 2.0), [0.0, 1.0, 2.0]
+    motion = sm.plan_by(
+        sm.Problem(arm, line, "position", start), sm.baselines.PseudoInverse()
+    ).trajectory
+    rows = np.column_stack([motion.t, motion.q])
+    write_csv(tmp_path / "a.csv", ["t", *motion.joint_names], rows)
+    poses = [arm.pose(motion(t)) for t in times]
+    along = sm.paths.Waypoints.from_poses(times, poses).to_dict()
+    table = np.column_stack([along["t"], along["positions"], along["quaternions"]])
+    write_csv(tmp_path / "b.csv", ["t", "x", "y", "z", "qw", "qx", "qy", "qz"], table)
+    asked = ("check", tmp_path / "a.csv", "--robot", "ur5", "--path", tmp_path / "b.csv")
+    for turn, code in (("0.1", 0), ("1e-9", 1)):
+        found, said = invoke(*asked, "--tolerance", "0.05", "--turn", turn, "--json")
+        assert found == code, said
+        assert json.loads(said)["rotation_error"]["value"] > 1e-9
+    assert "joints" in complaint("plan", "ur5", "--path", tmp_path / "b.csv")

@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import write_csv
 from selfmotion.shell.cli import app, main as command
 from support.arms import PANDA_HOME
-from support.shell import complaint
+from support.shell import complaint, on_circle
 
 
 @pytest.fixture(scope="module")
@@ -92,16 +92,17 @@ def test_jumps_of_acceleration_pass_every_limit_of_jerk(plan: sm.Plan) -> None:
 def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: Path) -> None:
     sm.files.write_motion(plan, tmp_path / "motion.csv", force=True)
     asked = [tmp_path / "motion.csv", "--robot", "panda", "--path", seam]
-    code, text = invoke(*asked, "--acceleration", "0.1")
+    code, text = invoke(*asked, "--set", "constraints.JointAccelerationLimits.limit=0.1")
     assert (code, "accelerates at" in text) == (1, True)
-    code, text = invoke(*asked, "--velocity", "0.05,9,9,9,9,9,9")
+    each = "constraints.JointVelocityLimits.limit=[0.05, 9, 9, 9, 9, 9, 9]"
+    code, text = invoke(*asked, "--set", each)
     assert (code, "joint 'panda_joint1' moves at" in text.replace("\n", " ")) == (1, True)
     hand = plan.robot.pose(plan.trajectory(2.0)).translation
     box = sm.obstacles.Box("box", hand, [0.02, 0.02, 0.02])
     (tmp_path / "world.json").write_text(json.dumps([box.to_dict()]))
-    code, text = invoke(*asked, "--obstacles", tmp_path / "world.json")
+    code, text = invoke(*asked, "--set", f"clearance.obstacles=@{tmp_path / 'world.json'}")
     assert (code, "box overlap by" in text) == (1, True)
-    code, text = invoke(*asked, "--clearance", "0.001", "-v")
+    code, text = invoke(*asked, "--set", "clearance.distance=0.001", "-v")
     assert (code, "self-collision" in text) == (0, True)
 
 
@@ -181,14 +182,12 @@ def test_a_robot_file_that_changed_is_said(tmp_path: Path) -> None:
     assert changed.certificate.verified
 
 
-def test_options_and_files_of_options_are_named_where_they_are_wrong(tmp_path: Path) -> None:
-    """Not the keys of the table that they make."""
+def test_keys_of_what_a_file_says_are_named_where_they_are_wrong(tmp_path: Path) -> None:
     file = tmp_path / "boxes.json"
     good = {"shape": "box", "name": "a", "size": [0.1] * 3, "position": [2.0, 0.0, 0.0]}
     file.write_text(json.dumps([good, good | {"name": "b", "id": 3}]))
-    asked = ("plan", "panda", "--circle", "0.1")
-    said = complaint(*asked, "--obstacles", file)
-    assert f"{file}: [1].id: unknown key" in said
-    assert "constraints" not in said
+    asked = ("plan", "panda", *on_circle("0.1"))
+    said = complaint(*asked, "--set", f"clearance.obstacles=@{file}")
+    assert "clearance.obstacles[1].id: unknown key" in said
     said = complaint(*asked, "--start", "0,0,0")
-    assert "--start: configuration has shape (3,), expected (7,)" in said
+    assert "configuration has shape (3,), expected (7,)" in said

@@ -10,10 +10,9 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.shell.cli import app, runs
+from selfmotion.shell.cli import runs
 from selfmotion.shell.cli.following import out_of_reach, replanner_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
@@ -162,7 +161,7 @@ def test_a_controller_that_is_silent_ends_it(tmp_path: Path) -> None:
     file, port = written(tmp_path), free_port()
     Controller(port, steps=3, ends=False).start()
     address = f"127.0.0.1:{port}"
-    code, shown = invoke("follow", file, "--listen", address, "--silence", "0.3")
+    code, shown = invoke("follow", file, "--listen", address, "--set", "loop.silence=0.3")
     assert code == 0
     assert "no state for 0.3 s" in shown
     assert "3 planned" in shown
@@ -216,17 +215,3 @@ def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
         other.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{other.getsockname()[1]}"
         assert f"--listen {address}" in complaint("follow", written(tmp_path), "--listen", address)
-
-
-# The command that tracks writes what it recorded.
-
-
-def test_the_command_writes_replay_plan_and_histogram(tmp_path: Path) -> None:
-    shown = CliRunner().invoke(app, ["track", "--seconds", "1.2", "--out", str(tmp_path)])
-    assert shown.exit_code == 0, shown.output
-    assert "120, every 10 ms" in shown.output
-    for name in ("track.html", "track.npz", "latency.png"):
-        assert (tmp_path / name).stat().st_size > 1000
-    assert "keeps up with a circle on a conveyor" in (tmp_path / "track.html").read_text()
-    plan = sm.load_plan(tmp_path / "track.npz")
-    assert plan.trajectory.duration == pytest.approx(1.19)

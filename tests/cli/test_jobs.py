@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.shell.cli import jobs
 from selfmotion.shell.cli.documents import seams_of_file
 from support.places import ROOT
-from support.shell import complaint, in_full, invoke
+from support.shell import complaint, in_full, invoke, on_circle
 
 TABLE = (ROOT / "examples" / "seams.csv").read_text()
 JOB = """
@@ -90,7 +90,7 @@ def test_a_deadline_of_the_shell_ends_a_job_and_a_plan(table, tmp_path) -> None:
     assert "the deadline of 1e-09 s came before there was a program" in errors
     assert json.loads(output)["error"]["class"] == "DeadlineError"
     # Without one there is the motion of least joint speed to end with.
-    code, output, _ = in_full("plan", "panda", "--circle", "0.1", *at_once)
+    code, output, _ = in_full("plan", "panda", *on_circle("0.1"), *at_once)
     assert (code, json.loads(output)["status"]) == (0, "deadline")
 
 
@@ -131,7 +131,7 @@ def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
     move = next(step.made for step in program.steps if isinstance(step.made, sm.Move))
     saved, written = tmp_path / "go.npz", tmp_path / "GO.MOD"
     move.save(saved)
-    code, text = invoke("export", saved, "--out", written, "--mass", "1.5")
+    code, text = invoke("export", saved, "--out", written, "--set", "mass=1.5")
     assert code == 0, text
     assert sm.files.read_motion(written).duration == pytest.approx(move.motion.duration, abs=1e-3)
     with pytest.raises(sm.errors.FileFormatError, match="is a move, not a plan"):
@@ -178,7 +178,9 @@ def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
     assert "event 'on' has no signal" in said
     settings.write_text("[signals]\non = [1, true]\noff = [1, false]\n")
     assert "Java (Sunrise)" in complaint("job", table, "--out", "a.src", "--settings", settings)
-    assert "export --mass KG" in complaint("job", table, "--out", "a.mod", "--settings", settings)
+    assert "export --set mass=KG" in complaint(
+        "job", table, "--out", "a.mod", "--settings", settings
+    )
     said = complaint("job", table, "--out", "frame.yaml", "--settings", settings)
     assert "--settings has no effect" in said
 

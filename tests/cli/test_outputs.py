@@ -10,14 +10,14 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion.shell.cli.outputs import print_large
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_circle
 
 
 def test_what_cannot_be_written_discards_neither_plan_nor_other_files(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     lost, kept = tmp_path / "file" / "lost.npz", tmp_path / "kept.csv"
     with pytest.raises(sm.errors.FileFormatError) as raised:
-        invoke("plan", "planar_3r", "--circle", "0.1", "--out", lost, "--out", kept)
+        invoke("plan", "planar_3r", *on_circle("0.1", "z"), "--out", lost, "--out", kept)
     line = str(raised.value)
     assert kept.is_file()
     rescued = line.rpartition("the plan is in ")[2]
@@ -39,7 +39,7 @@ def test_results_are_there_for_programs(tmp_path: Path) -> None:
 
 def test_a_plan_says_of_its_motions_what_export_says(tmp_path: Path) -> None:
     plan, motion = tmp_path / "plan.npz", tmp_path / "motion.yaml"
-    asked = ("plan", "planar_3r", "--circle", "0.1", "--out", plan, "--out", motion)
+    asked = ("plan", "planar_3r", *on_circle("0.1", "z"), "--out", plan, "--out", motion)
     code, planned = invoke(*asked)
     assert code == 0, planned
     code, exported = invoke("export", plan, "--out", motion)
@@ -90,9 +90,10 @@ def test_outputs_outside_of_the_files_folder_need_a_word(tmp_path: Path) -> None
         'name = "panda"\n[path]\nkind = "line"\nby = [0, 0.05, 0]\nduration = 3\n'
     )
     for out in ("../measured.csv", str(mine), "link.csv"):
-        for command in ("plan", "fastest"):
+        for goal in ("best", "fastest"):
             cell.write_text(text.replace("OUT", out))
-            assert "is outside of the file's own folder; say --force" in complaint(command, cell)
+            said = complaint("plan", cell, "--set", f"goal={goal}")
+            assert "is outside of the file's own folder; say --force" in said
         assert mine.read_text().startswith("what took")
     cell.write_text(text.replace("OUT", "../measured.csv"))
     assert invoke("plan", cell, "--force")[0] == 0

@@ -15,7 +15,7 @@ from selfmotion.shell.cli import app, summaries
 from selfmotion.shell.cli.summaries import in_shell
 from selfmotion.shell.cli.tables import show_certificate
 from support.arms import robot_named
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_circle
 
 # What a reader takes in at a glance.
 MOST_LINES = 4
@@ -156,10 +156,18 @@ TIMED = "t,x,y,z\n0,0.4,0,0.4\n1,0.5,0,0.4\n"
     ("text", "options", "said"),
     [
         (TABLE, "--feed 0.1", "(--task position)"),
-        (TABLE, "--task position", "give either --feed (m/s) or --duration (s)"),
-        (TIMED, "--task position --duration 3", "so that --duration has no effect; drop it"),
-        (TABLE, "--feed 0.1 --jump 0.01 --task position", "give a larger --jump"),
-        (TABLE, "--duration 1 --corners round --task position", "which needs --feed (m/s)"),
+        (TABLE, "--task position", "give either --feed (m/s) or path.duration (s)"),
+        (
+            TIMED,
+            "--task position --set path.duration=3",
+            "so that path.duration has no effect; drop it",
+        ),
+        (TABLE, "--feed 0.1 --set path.jump=0.01 --task position", "give a larger --set path.jump"),
+        (
+            TABLE,
+            "--set path.duration=1 --set path.corners=round --task position",
+            "which needs --feed (m/s)",
+        ),
     ],
 )
 def test_remedies_name_options(text: str, options: str, said: str, tmp_path: Path) -> None:
@@ -171,11 +179,11 @@ def test_remedies_name_options(text: str, options: str, said: str, tmp_path: Pat
 def test_the_order_of_quaternions_is_asked_for_by_its_option(tmp_path: Path) -> None:
     np.save(tmp_path / "seam.npy", np.ones((3, 7)))
     line = complaint("plan", "panda", "--path", tmp_path / "seam.npy", "--feed", "0.1")
-    assert "give --columns ('x,y,z,qw,qx,qy,qz' or 'x,y,z,qx,qy,qz,qw')" in line
+    assert "give --set path.columns ('x,y,z,qw,qx,qy,qz' or 'x,y,z,qx,qy,qz,qw')" in line
 
 
 def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
-    line = complaint("plan", "ur5", "--circle", "0.05", "--task", "pose")
+    line = complaint("plan", "ur5", *on_circle("0.05"), "--task", "pose")
     assert "take another --task (position, pointing, planar), relax some" in line
     urdf = tmp_path / "two.urdf"
     parts = ['<link name="base"/>']
@@ -183,7 +191,7 @@ def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
         parts.append(f'<link name="{name}"/><joint name="j{name}" type="continuous">')
         parts.append(f'<parent link="base"/><child link="{name}"/><axis xyz="0 0 1"/></joint>')
     urdf.write_text(f'<robot name="two">{"".join(parts)}</robot>')
-    assert complaint("plan", urdf, "--circle", "0.1").endswith("name the tool frame with --tool")
+    assert complaint("plan", urdf, *on_circle("0.1")).endswith("name the tool frame with --tool")
 
 
 def test_problem_files_keep_their_own_words(tmp_path: Path) -> None:
@@ -197,7 +205,7 @@ def test_problem_files_keep_their_own_words(tmp_path: Path) -> None:
 
 def test_a_circle_of_a_planar_arm_lies_in_its_plane(tmp_path: Path) -> None:
     file = tmp_path / "plan.npz"
-    code, _ = invoke("plan", "planar_3r", "--circle", "0.3", "--out", file, "--json")
+    code, _ = invoke("plan", "planar_3r", *on_circle("0.3", "z"), "--out", file, "--json")
     assert code == 0
     plan = sm.load_plan(file)
     assert plan.problem.task is sm.Task.PLANAR

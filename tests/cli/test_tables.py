@@ -54,10 +54,10 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
 @pytest.mark.parametrize(
     ("amount", "allowed", "kept", "told"),
     [
-        (0.015, 0.0147, True, "at least 0.0147"),
-        (0.014, 0.0147, False, "at least 0.0147"),
-        (0.0, 1e-6, True, "1e-06 allowed"),
-        (0.1, 1e-6, False, "1e-06 allowed"),
+        (0.015, 0.0147, True, "at least 0.0147 m/s"),
+        (0.014, 0.0147, False, "at least 0.0147 m/s"),
+        (0.0, 1e-6, True, "1e-06 m/s allowed"),
+        (0.1, 1e-6, False, "1e-06 m/s allowed"),
     ],
 )
 def test_a_limit_is_told_with_its_side(
@@ -78,8 +78,8 @@ def test_a_limit_is_told_with_its_side(
 @pytest.mark.parametrize(
     ("unit", "amount", "allowed", "told"),
     [
-        ("rad/s²", 0.0075, 1e-3, "acceleration at rest (0.001 allowed)"),
-        ("rad/s", 2e-5, 1e-6, "speed at rest (1e-06 allowed)"),
+        ("rad/s²", 0.0075, 1e-3, "acceleration at rest (0.001 rad/s² allowed)"),
+        ("rad/s", 2e-5, 1e-6, "speed at rest (1e-06 rad/s allowed)"),
     ],
 )
 def test_what_moves_at_rest_is_told_with_its_unit(
@@ -113,7 +113,8 @@ def test_plans_are_compared_by_costs_that_the_shell_names(tmp_path: Path) -> Non
     files = [tmp_path / "plan.npz", tmp_path / "slower.npz"]
     for one, file in zip((plan, slower), files, strict=True):
         one.save(file)
-    asked = ("--cost", "JointVelocity", "--cost", "JointAcceleration=0.1")
+    costs_of = 'costs=[{kind="JointVelocity"}, {kind="JointAcceleration", weight=0.1}]'
+    asked = ("--set", costs_of)
     code, text = invoke("compare", *files, *asked, "--json")
     assert code == 0
     told = json.loads(text)
@@ -127,4 +128,5 @@ def test_plans_are_compared_by_costs_that_the_shell_names(tmp_path: Path) -> Non
     assert "joint acceleration" in text
     assert "total cost" in text
     assert "measured" not in invoke("compare", *files, "--json")[1]
-    assert "expected NAME or NAME=WEIGHT" in complaint("compare", *files, "--cost", "Nothing")
+    said = complaint("compare", *files, "--set", 'costs=[{kind="Nothing"}]')
+    assert "costs[0]: kind is 'Nothing'" in said

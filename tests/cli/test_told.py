@@ -12,7 +12,7 @@ from selfmotion.model.task import SE3
 from selfmotion.shell.cli.summaries import blocked_text
 from selfmotion.shell.documents import example_text
 from support.arms import robot_named
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_line
 
 CIRCLE = """\
 task = "pointing"
@@ -113,7 +113,7 @@ def test_the_example_of_a_job_has_no_event_that_nothing_switches() -> None:
 
 
 def test_what_is_left_to_save_is_told_in_numbers_that_mean_something(tmp_path: Path) -> None:
-    line = "--line", "0.03,0,0", "--task", "pointing", "--no-self-collision", "-v"
+    line = *on_line("0.03,0,0"), "--task", "pointing", "--set", "clearance=false", "-v"
     _, said = invoke("plan", "ur5", *line)
     (told,) = (text for text in said.splitlines() if "further saving possible" in text)
     assert "e-" not in told

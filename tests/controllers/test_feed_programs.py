@@ -125,7 +125,7 @@ def test_the_shell_says_what_of_a_seam_at_its_feed_it_does_not_judge(
     limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
     sm.files.write_problem(replace(line.problem, constraints=limits), cell)
     line.save(tmp_path / "plan.npz")
-    asked = ("--targets", "poses", "--mass", "3")
+    asked = ("--set", "targets=poses", "--set", "mass=3")
     code, text = invoke("export", tmp_path / "plan.npz", "--out", file, *asked)
     assert code == 0, text
     assert "1 target, between which" in text

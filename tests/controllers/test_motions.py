@@ -209,7 +209,7 @@ def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_pat
     plan.save(tmp_path / "plan.npz")
     for name in ("a.yaml", "a.csv", "a.json", "a.npz", "a.xml", "a.src", "a.script"):
         with pytest.raises(
-            sm.errors.PlanError, match=r"joint '\w+' begins at .* rad/s at t = 0 s.*--ramp"
+            sm.errors.PlanError, match=r"joint '\w+' begins at .* rad/s at t = 0 s.*path.ramp=0.5"
         ):
             sm.files.write_motion(plan, tmp_path / name)
         assert not (tmp_path / name).exists()

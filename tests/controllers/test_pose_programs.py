@@ -300,10 +300,10 @@ def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> N
     plan = sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, clearance=None)).require()
     plan.save(tmp_path / "plan.npz")
     out = tmp_path / "weld.mod"
-    asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses")
-    with pytest.raises(sm.errors.ProblemError, match=r"mass of what the flange carries.*--mass KG"):
+    asked = ("export", tmp_path / "plan.npz", "--out", out, "--set", "targets=poses")
+    with pytest.raises(sm.errors.ProblemError, match=r"mass of what the flange carries.*mass=KG"):
         invoke(*asked)
-    code, text = invoke(*asked, "--mass", "2")
+    code, text = invoke(*asked, "--set", "mass=2")
     assert code == 0, text
     why = "poses do not keep the motion: joint 'panda_joint3' is in the arm itself"
     assert why in text
@@ -440,14 +440,17 @@ def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> 
         sm.files.read_program_settings(held, targets="poses")
     alone.save(tmp_path / "plan.npz")
     out = tmp_path / "a.src"
-    asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses", "--wobj")
-    code, text = invoke(*asked, "0.1,0.2,0.3,0,0,1.5707963267948966")
+    asked = ("export", tmp_path / "plan.npz", "--out", out, "--set", "targets=poses")
+    work_object = (
+        "work_object={position=[0.1, 0.2, 0.3], rotation_vector=[0, 0, 1.5707963267948966]}"
+    )
+    code, text = invoke(*asked, "--set", work_object)
     assert code == 0, text
     assert "$BASE = {X 100.00000, Y 200.00000, Z 300.00000, A 90.00000, B " in out.read_text()
-    with pytest.raises(sm.errors.ProblemError, match="neither the name of a link nor six numbers"):
-        invoke(*asked, "1,2,3")
-    with pytest.raises(sm.errors.ProblemError, match="--targets: of controllers' programs"):
-        invoke("export", tmp_path / "plan.npz", "--out", tmp_path / "a.csv", "--targets", "poses")
+    with pytest.raises(sm.errors.ProblemError, match=r"targets=poses: is of controllers' programs"):
+        invoke(
+            "export", tmp_path / "plan.npz", "--out", tmp_path / "a.csv", "--set", "targets=poses"
+        )
 
 
 @pytest.mark.parametrize(
@@ -579,15 +582,18 @@ def test_what_work_objects_cannot_be_is_said(alone: sm.Plan, tmp_path: Path) -> 
     ("given", "said"),
     [
         (
-            "600,-100,200,0,0,0",
+            "{position=[600, -100, 200]}",
             "work_object: 600 m is far from any arm, expected at most 50; in millimetres",
         ),
-        ("0.6,-0.1,0.2,0,0,90", "--wobj has a rotation vector of 90 rad"),
-        ("0.6,-0.1,0.2,3,2,0", "more than half a turn; in degrees, or angles about axes"),
+        ("{position=[0.6, -0.1, 0.2], rotation_vector=[0, 0, 90]}", "90 rad is more than a turn"),
+        (
+            "{position=[0.6, -0.1, 0.2], rotation_vector=[3, 2, 0]}",
+            "more than half a turn; in degrees, or angles about axes",
+        ),
     ],
 )
 def test_numbers_of_work_objects_in_other_units_are_refused(given: str, said: str) -> None:
-    typed = ("--out", "a.src", "--targets", "poses", "--wobj", given)
+    typed = ("--out", "a.src", "--set", "targets=poses", "--set", f"work_object={given}")
     assert said in complaint("export", "any.npz", *typed)
 
 

@@ -356,7 +356,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     sm.files.write_motion(made, tmp_path / name, settings=asked)
     code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml", "-v")
     assert code == 0, text
-    assert "feed (at least 0.049)" in text
+    assert "feed (at least 0.049 m/s)" in text
     # Slower than it was written, it neither takes its time nor keeps the feed.
     late = (tmp_path / name).read_text()
     late = re.sub(r"(TIME_BLOCK END = )", r"\g<1>1", late)
@@ -364,7 +364,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     (tmp_path / name).write_text(late)
     code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml", "-v")
     assert code == 1
-    assert "feed (at least 0.049)" in text
+    assert "feed (at least 0.049 m/s)" in text
 
 
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from selfmotion.shell.documents import example_text
 from selfmotion.shop.cam import Reading, one_seam
 from selfmotion.shop.cam.gcode import read_gcode
 from support.own_kinematics import Arm, along
-from support.shell import complaint, in_full, invoke
+from support.shell import complaint, in_full, invoke, on_circle, on_line
 
 CASES = Path(__file__).parents[1] / "cases"
 PANDA_AT = ("--frame", "0.45,0,0.3,0,0,0", "--task", "pointing")
@@ -66,7 +66,7 @@ def test_drilled_holes_have_the_feeds_of_their_files(
         file = tmp_path / "peck.nc"
         file.write_text(text.replace("Z-10", "Z1.2"))
     # What it costs is not looked at.
-    asked = (*PANDA_AT, "--max-evaluations", "1")
+    asked = (*PANDA_AT, "--set", "max_evaluations=1")
     plan, notes = reported(tmp_path, "panda", "--path", file, *asked)
     assert {round(feed.asked, 6) for feed in plan.path.feeds} == {0.006667}
     assert all(feed.kept for feed in plan.path.feeds)
@@ -82,7 +82,7 @@ def test_a_flat_block_is_that_of_scale_one(tmp_path: Path) -> None:
     line = sm.files.read_path(file, feed=0.02, seam="0 2")
     ends = [line.pose(0.0).translation, line.pose(line.duration).translation]
     np.testing.assert_allclose(ends, [[0, 0, 0], [0.06, 0, 0]], atol=DIGITS)
-    asked = ("--feed", "0.02", "--seam", "0 1", *PANDA_AT)
+    asked = ("--feed", "0.02", "--set", "path.seam=0 1", *PANDA_AT)
     found = along_it(planned(tmp_path, "panda", "--path", file, *asked).path)
     plain = sm.files.read_path(file.with_name("plain.dxf"), feed=0.02, seam="0 1")
     moved = np.add(along_it(plain), [0.45, 0.0, 0.3])
@@ -106,6 +106,9 @@ def test_words_of_sinumerik_say_the_tools_axis(tmp_path: Path) -> None:
     np.testing.assert_allclose(ends[-1], [80, 0, 0], atol=1e-2)
 
 
+TABLE = ("--feed", "0.1", "--task", "position")
+
+
 @pytest.mark.parametrize("name", ["teach.mod", "cut.src", "move.script"])
 def test_programs_of_others_are_named_as_such(name: str) -> None:
     file = CASES / "programs_of_others" / name
@@ -113,7 +116,7 @@ def test_programs_of_others_are_named_as_such(name: str) -> None:
     assert "is a program of a robot" in said
     assert "write its targets as a table" in said
     table = CASES / "along_the_path" / "square.csv"
-    judged = complaint("check", file, "--robot", "panda", "--path", table)
+    judged = complaint("check", file, "--robot", "panda", "--path", table, *TABLE)
     assert re.search(r"line \d+: '.*' is not read: selfmotion did not write this", judged)
     assert "of another one judge the recorded motion, a table of t and a column per" in judged
 
@@ -153,9 +156,9 @@ def test_a_line_may_begin_with_the_tools_axis(tmp_path: Path) -> None:
 
 def test_a_limit_without_effort_or_speed_is_none(tmp_path: Path) -> None:
     folder = CASES / "limit_without_effort"
-    known = planned(tmp_path, folder / "with_effort.urdf", "--circle", "0.03")
+    known = planned(tmp_path, folder / "with_effort.urdf", *on_circle("0.03"))
     for name in ("no_effort", "continuous_velocity_only"):
-        plan, notes = reported(tmp_path, folder / f"{name}.urdf", "--circle", "0.03")
+        plan, notes = reported(tmp_path, folder / f"{name}.urdf", *on_circle("0.03"))
         robot = sm.load_robot(folder / f"{name}.urdf")
         assert "<limit> without effort: taken for none, torques are not limited" in notes
         if name == "no_effort":
@@ -183,7 +186,7 @@ def test_a_limit_of_zero_or_in_degrees_is_told(limit: str, note: str) -> None:
 def test_a_planar_joint_with_limits_is_three_joints(tmp_path: Path) -> None:
     folder = CASES / "planar_base"
     text = (folder / "planar_base.urdf").read_text()
-    asked = ("--line", "0.3,0,0", "--feed", "0.15", "--task", "pointing")
+    asked = (*on_line("0.3,0,0", ""), "--feed", "0.15", "--task", "pointing")
     said = complaint("plan", folder / "planar_base.urdf", *asked)
     assert "read as base_move_x, base_move_y, base_move_yaw" in said
     limit = '<limit lower="-5" upper="5" velocity="0.5" effort="100"/></joint>'
@@ -310,28 +313,33 @@ TELESCOPE = ("mast,a1", "mast,a2", "mast,a3", "a0,a2", "a0,a3", "a1,a3")
 def test_links_of_a_telescope_are_told_in_one_go_and_left_out_when_asked(tmp_path: Path) -> None:
     tubes = CASES / "telescope" / "tubes.urdf"
     # Half the way: what is looked at is what is said and left out.
-    asked = ("--tool", "tip", "--line", "0,-0.05,0.05", "--task", "pointing")
+    asked = ("--tool", "tip", *on_line("0,-0.05,0.05"), "--task", "pointing")
     start = ("--start", "0.3,0.02,0.02,0.02,0.02,0.2,0.2,0.1")
     code, text = invoke("plan", tubes, *asked, *start, "--json")
     assert code == 1
-    (note,) = (note for note in json.loads(text)["remarks"] if "--disabled" in note)
+    (note,) = (note for note in json.loads(text)["remarks"] if "clearance.disabled" in note)
     for pair in TELESCOPE:
         one, other = pair.split(",")
         assert re.search(rf"{one} - {other}: these links overlap in \d+ % .*, by \d+", note)
-        assert f"--disabled {pair}" in note
+        assert f'["{one}", "{other}"]' in note
         assert f'<disable_collisions link1="{one}" link2="{other}"' in note
-    out = [word for pair in TELESCOPE for word in ("--disabled", pair)]
+
+    def left_out(listed: list[str] | tuple[str, ...]) -> tuple[str, str]:
+        return "--set", f"clearance.disabled={json.dumps([pair.split(',') for pair in listed])}"
+
+    out = left_out(TELESCOPE)
     plan = planned(tmp_path, tubes, *asked, *start, *out)
     (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
     assert {",".join(pair) for pair in clearance.disabled} == set(TELESCOPE)
     # Those that are left are looked at.
-    fewer = out[:-2]
+    fewer = left_out(TELESCOPE[:-1])
     assert invoke("check", tmp_path / "x.npz", *out)[0] == 0
     assert invoke("check", tmp_path / "x.npz", *fewer)[0] == 1
     assert "a1 - a3 overlap by" in invoke("plan", tubes, *asked, *start, *fewer, "--verbose")[1]
-    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast")
-    assert "--disabled is 'mast', expected two links" in said
-    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast,a9")
+    said = complaint("plan", tubes, *asked, *start, "--set", 'clearance.disabled=[["mast"]]')
+    assert "disabled" in said
+    assert "mast" in said
+    said = complaint("plan", tubes, *asked, *start, "--set", 'clearance.disabled=[["mast", "a9"]]')
     assert "has no link 'a9'" in said
     text = example_text(tubes, tmp_path / "t.toml", tool="tip", disabled=[("mast", "tip")])
     assert '["mast", "tip"], ["mast", "a1"]' in text
@@ -340,8 +348,8 @@ def test_links_of_a_telescope_are_told_in_one_go_and_left_out_when_asked(tmp_pat
 @pytest.mark.parametrize("name", ["plain.srdf", "included.srdf.xacro", "arguments.srdf.xacro"])
 def test_an_srdf_that_is_xacro_is_expanded(name: str, tmp_path: Path) -> None:
     folder = CASES / "srdf_xacro"
-    arm = (folder / "arm.urdf", "--tool", "grasp", "--circle", "0.03")
-    plan = planned(tmp_path, *arm, "--srdf", folder / name)
+    arm = (folder / "arm.urdf", "--tool", "grasp", *on_circle("0.03"))
+    plan = planned(tmp_path, *arm, "--set", f"clearance.srdf={folder / name}")
     (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
     assert set(clearance.disabled) == {("bar", "left"), ("bar", "right")}
 
@@ -360,25 +368,34 @@ def test_an_srdf_is_given_the_arguments_of_its_arm_and_none_is_read_as_empty(
         '<xacro:arg name="p" default=""/><xacro:property name="p" value="$(arg p)"/>'
         f"{names.partition('>')[2]}"
     )
-    asked = (tmp_path / "arm.urdf.xacro", "--argument", "p=my_", "--tool", "grasp")
+    asked = (tmp_path / "arm.urdf.xacro", "--set", "robot.arguments.p=my_", "--tool", "grasp")
     plan = planned(
-        tmp_path, *asked, "--circle", "0.03", "--srdf", tmp_path / "arguments.srdf.xacro"
+        tmp_path,
+        *asked,
+        *on_circle("0.03"),
+        "--set",
+        f"clearance.srdf={tmp_path / 'arguments.srdf.xacro'}",
     )
     (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
     assert ("my_bar", "my_left") in clearance.disabled
     empty = tmp_path / "empty.srdf"
     empty.write_text('<robot name="arm"><group name="arm"/></robot>')
-    plain = (tmp_path / "arm.urdf", "--tool", "grasp", "--circle", "0.03")
-    said = complaint("plan", *plain, "--srdf", empty)
+    plain = (tmp_path / "arm.urdf", "--tool", "grasp", *on_circle("0.03"))
+    said = complaint("plan", *plain, "--set", f"clearance.srdf={empty}")
     assert "has no <disable_collisions>" in said
 
 
 def test_five_joints_follow_what_a_tolerance_lets_them(tmp_path: Path) -> None:
     arm = CASES / "five_joints_relaxed" / "arm5.urdf"
-    asked = (arm, "--line", "0,0.1,0", "--start", "0,0.6,0.9,1.0,0")
+    asked = (arm, *on_line("0,0.1,0"), "--start", "0,0.6,0.9,1.0,0")
     for more in (
-        ("--task", "pointing", "--relax", "rx,ry=0.5"),
-        ("--task", "pose", "--relax", "rx,ry=0.5", "--relax", "rz"),
+        ("--task", "pointing", "--set", 'relaxations=[{rows=["rx", "ry"], band=0.5}]'),
+        (
+            "--task",
+            "pose",
+            "--set",
+            'relaxations=[{rows=["rx", "ry"], band=0.5}, {rows=["rz"]}]',
+        ),
     ):
         rotations, places = tips_of(planned(tmp_path, *asked, *more))
         begin, end = places[0], places[-1]
@@ -391,13 +408,20 @@ def test_five_joints_follow_what_a_tolerance_lets_them(tmp_path: Path) -> None:
 def test_the_tolerance_that_would_do_is_told(tmp_path: Path) -> None:
     """The base joint turns by atan2(0.1, 0.558) = 0.177 rad: an axis at 2.5 rad leans by 0.106."""
     arm = CASES / "five_joints_relaxed" / "arm5.urdf"
-    asked = (arm, "--line", "0,0.1,0", "--start", "0,0.6,0.9,1.0,0", "--task", "pointing")
+    asked = (arm, *on_line("0,0.1,0"), "--start", "0,0.6,0.9,1.0,0", "--task", "pointing")
     said = complaint("plan", *asked)
-    assert said.endswith("with --relax: rx,ry=0.11 (rad) would do from this start")
-    planned(tmp_path, *asked, "--relax", "rx,ry=0.11")
+    assert said.endswith("with relaxations (--set): rx,ry=0.11 (rad) would do from this start")
+    planned(tmp_path, *asked, "--set", 'relaxations=[{rows=["rx", "ry"], band=0.11}]')
     less = 2.0 * math.asin(math.sin(0.5 * math.atan2(0.1, 0.558)) * math.sin(2.5))
     assert 0.1 < less < 0.11
-    code, text = invoke("plan", *asked, "--relax", "rx,ry=0.1", "--out", tmp_path / "y.npz")
+    code, text = invoke(
+        "plan",
+        *asked,
+        "--set",
+        'relaxations=[{rows=["rx", "ry"], band=0.1}]',
+        "--out",
+        tmp_path / "y.npz",
+    )
     assert code == 1
     assert "not verified" in text
 
@@ -405,7 +429,13 @@ def test_the_tolerance_that_would_do_is_told(tmp_path: Path) -> None:
 def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
     folder = CASES / "collada_unit"
     boxes = []
-    near = ("--circle", "0.03", "--obstacles", folder / "room.json", "--clearance", "0.01")
+    near = (
+        *on_circle("0.03"),
+        "--set",
+        f"clearance.obstacles=@{folder / 'room.json'}",
+        "--set",
+        "clearance.distance=0.01",
+    )
     for name in ("dae_m_z", "dae_mm_z"):
         robot = planned(tmp_path, folder / f"{name}.urdf", *near).robot
         model = sm.obstacles.CollisionModel(robot)
@@ -597,7 +627,7 @@ def tool_along(path: sm.paths.Path, count: int = 4001) -> tuple[np.ndarray, ...]
 @pytest.mark.parametrize("corners", ["stop", "round"])
 def test_a_knife_points_along_its_path(corners: str, tmp_path: Path) -> None:
     square = CASES / "along_the_path" / "square.csv"
-    asked = ("--along", "x", "--corners", corners, "--feed", "0.03")
+    asked = ("--set", "path.along=x", "--set", f"path.corners={corners}", "--feed", "0.03")
     plan = planned(tmp_path, "panda", "--path", square, *asked, "--frame", "0.45,0,0.3,0,0,0")
     rotations, places = tips_of(plan, 4001)
     places = 1e3 * (places - [0.45, 0.0, 0.3])
@@ -662,8 +692,17 @@ def test_a_tilt_leans_the_tool_to_the_left_of_where_it_goes(
 
 def test_a_tool_that_is_lifted_turns_in_the_air_and_comes_back(tmp_path: Path) -> None:
     square = CASES / "along_the_path" / "square.csv"
-    asked = ("--along", "x", "--corners", "stop", "--feed", "0.03", "--lift", "0.02")
-    leans = ("--lead", "0.1", "--tilt", "-0.1", "--task", "pointing")
+    asked = (
+        "--set",
+        "path.along=x",
+        "--set",
+        "path.corners=stop",
+        "--feed",
+        "0.03",
+        "--set",
+        "path.lift=0.02",
+    )
+    leans = ("--set", "path.lead=0.1", "--set", "path.tilt=-0.1", "--task", "pointing")
     plan = planned(
         tmp_path, "panda", "--path", square, *asked, *leans, "--frame", "0.45,0,0.3,0,0,0"
     )
@@ -737,7 +776,7 @@ def test_what_along_cannot_be_is_said(options: dict[str, object], said: str) -> 
 def retimed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The line of the case, in the least time at 0.2 rad/s²."""
     folder = tmp_path_factory.mktemp("retimed")
-    line = ("--line", "0,0.2,0", "--task", "position", "--start", "home")
+    line = (*on_line("0,0.2,0"), "--task", "position", "--start", "home")
     code, text = invoke("plan", "panda", *line, "--out", folder / "l.npz")
     assert code == 0, text
     fast = ("--acceleration", "0.2", "--out", folder / "rt.npz")

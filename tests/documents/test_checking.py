@@ -162,7 +162,6 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     file = written(tmp_path, CELL + '[grid]\n"path.duration" = [3, 5]\n')
     assert "grid has 2 problems: use `selfmotion batch`" in complaint("plan", file)
     file = written(tmp_path, CELL)
-    assert "so that --circle has no effect" in complaint("plan", file, "--circle", "0.1")
     assert "costs.7.mu: leads to '7'" in complaint("plan", file, "--set", "costs.7.mu=1")
     assert "--set is 'a', expected KEY=VALUE" in complaint("plan", file, "--set", "a")
 

@@ -132,8 +132,8 @@ def test_a_tool_that_turns_in_place_takes_time_for_it(tmp_path: Path) -> None:
 def test_a_table_without_header_is_planned_with_columns(tmp_path: Path) -> None:
     file = written(tmp_path, "a.csv", "\n".join(row.replace(" ", ",") for row in _ROWS))
     asked = ("plan", "panda", "--path", file, "--task", "position", "--feed", "0.05")
-    assert f"add {_NORMALS} (or say --columns {_NORMALS})" in complaint(*asked)
-    code, text = invoke(*asked, "--columns", _NORMALS)
+    assert f"add {_NORMALS} (or say --set path.columns={_NORMALS})" in complaint(*asked)
+    code, text = invoke(*asked, "--set", f"path.columns={_NORMALS}")
     assert code == 0, text
 
 
@@ -184,8 +184,8 @@ def test_normals_that_seem_to_point_out_are_told(
     printed = CliRunner().invoke(app, ["job", str(listed)]).output
     assert "seam 'right' are out of reach as read, and in reach with" in printed
     asked = ["plan", "panda", "--path", file, "--task", "pointing", "--feed", "0.05"]
-    said = "out of reach as read, and in reach with --flip-normals"
-    for more, is_told in (([], True), (["--flip-normals"], False)):
+    said = "out of reach as read, and in reach with --set path.flip_normals=true"
+    for more, is_told in (([], True), (["--set", "path.flip_normals=true"], False)):
         printed = CliRunner().invoke(app, [*map(str, asked), *more]).output
         assert (said in printed) == is_told
 
@@ -194,7 +194,7 @@ def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) 
     text = "x [m],y [m],z [m]\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
     file = written(tmp_path, "three.csv", text)
     (note,) = sm.files.read_path(file, feed=0.05).notes
-    assert "by up to 40.0 mm at line 3: corners round (--corners round) keeps 1 mm" in note
+    assert "by up to 40.0 mm at line 3: corners round (--set path.corners=round) keeps 1 mm" in note
     assert sm.files.read_path(file, feed=0.05, corners="round").notes == ()
     assert sm.files.read_path(file, feed=0.05, corners="stop").notes == ()
     # Not of what is smooth.
@@ -213,7 +213,7 @@ def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) 
         "feed = 0.05\nframe = { position = [0.0, 0.01, 0.0] }\n"
     )
     assert note in sm.read_problem(placed).remarks
-    asked = ("plan", str(placed), "--json", "--max-evaluations", "1")
+    asked = ("plan", str(placed), "--json", "--set", "max_evaluations=1")
     found = CliRunner().invoke(app, asked)
     assert note in json.loads(found.stdout)["remarks"]
     assert f"note: {note}" in found.stderr
@@ -432,7 +432,7 @@ def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None
     ):
         sm.files.read_path(file)
     asked = ("plan", "panda", "--path", file, "--task", "pointing")
-    assert "say --rotary table with --rotary-axes (BC, AC)" in complaint(*asked)
+    assert "say --set path.rotary=table with --set path.rotary_axes (BC, AC)" in complaint(*asked)
     known = {
         name: sm.files.read_path(file, rotary="head").pose(0.5).homogeneous for name in ("head",)
     }

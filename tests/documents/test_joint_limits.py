@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 import selfmotion as sm
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_line
 
 PANDA = {
     "default_velocity_scaling_factor": 0.5,
@@ -121,7 +121,7 @@ def test_what_is_wrong_is_named_by_joint_and_key(
         sm.files.read_joint_limits(file, panda)
     assert message in str(refused.value)
     assert str(file) in str(refused.value)
-    line = complaint("plan", "panda", "--line", "0.1,0,0", "--joint-limits", file)
+    line = complaint("plan", "panda", *on_line("0.1,0,0"), "--set", f"joint_limits={file}")
     assert message in line
 
 
@@ -135,12 +135,12 @@ def test_plans_keep_the_limits_of_a_file(tmp_path: Path) -> None:
         limits.update(has_velocity_limits=True, max_velocity=0.12)
     file = written(tmp_path, slow)
     out = tmp_path / "plan.npz"
-    seam = ("plan", "panda", "--line", "0.1,0,0", "--duration", "3")
+    seam = ("plan", "panda", *on_line("0.1,0,0"), "--set", "path.duration=3")
     code, _ = invoke(*seam, "--out", out)
     assert code == 0
     free = np.abs(sm.load_plan(out).trajectory.extremes(1)[1]).max()
     assert free > 0.12
-    code, text = invoke(*seam, "--joint-limits", file, "--out", out)
+    code, text = invoke(*seam, "--set", f"joint_limits={file}", "--out", out)
     kept = np.abs(sm.load_plan(out).trajectory.extremes(1)[1]).max()
     assert (code == 0) == (kept <= 0.12), text
 

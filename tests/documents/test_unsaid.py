@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.shell.cli import app
 from selfmotion.shop.cam.path_files import _READERS
 from selfmotion.shop.cam.pose_rows import CLDATA, PROGRAMS
-from support.shell import invoke
+from support.shell import invoke, on_line
 
 CASES = Path(__file__).parents[1] / "cases"
 DOWN = [[1.0, 0.0, 0.0, 0.45], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.3], [0.0, 0.0, 0.0, 1.0]]
@@ -168,7 +168,7 @@ def test_what_an_arm_does_not_say_is_told(tmp_path: Path) -> None:
         '<ros2_control name="c" type="system"><joint name="j3"><command_interface name="position">'
         '<param name="max">1.5</param></command_interface></joint></ros2_control>'
     )
-    asked = ("--line", "0.02,0,0", "--task", "position", "--no-self-collision")
+    asked = (*on_line("0.02,0,0"), "--task", "position", "--set", "clearance=false")
     axes = "'j1', 'j2', 'j3', 'j4', 'j5' and 2 more: no <axis>, which is x then"
     unit = "bodies of 'l1', 'l2', 'l3', 'l4', 'l5' and 2 more: their mesh files say no unit"
     said = told(arm(tmp_path, soft, body.format("bare.dae"), control), *asked)
@@ -202,8 +202,15 @@ def test_what_files_beside_an_arm_do_not_say_is_told(tmp_path: Path) -> None:
         json.dumps([{"shape": "mesh", "name": "part", "file": "part.stl",
                      "position": [0.9, 0.9, 0.9]}])
     )  # fmt: skip
-    files = ("--joint-limits", limits, "--srdf", srdf, "--obstacles", obstacles)
-    said = told("panda", "--line", "0,0.02,0", *files)
+    files = (
+        "--set",
+        f"joint_limits={limits}",
+        "--set",
+        f"clearance.srdf={srdf}",
+        "--set",
+        f"clearance.obstacles=@{obstacles}",
+    )
+    said = told("panda", *on_line("0,0.02,0"), *files)
     notes = (
         "limits are taken for rad and s (m of joints that slide), as MoveIt's are",
         "default_velocity_scaling_factor 0.5 is applied",

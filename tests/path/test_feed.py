@@ -219,7 +219,7 @@ def test_files_at_a_feed(tmp_path) -> None:
         t[corners] = path.duration
     assert t["round"] < t["stop"]
     assert "corners are 'round', which needs --feed" in complaint(
-        "plan", "panda", "--path", file, "--duration", "4", "--corners", "round"
+        "plan", "panda", "--path", file, "--set", "path.duration=4", "--set", "path.corners=round"
     )
 
 

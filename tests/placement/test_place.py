@@ -336,7 +336,7 @@ def test_places_from_the_shell(tmp_path: Path) -> None:
     )
     sm.files.write_problem(planar(), cell)
     code, told = invoke(
-        "place", cell, "--x=-0.1,0.1", "--y=0,0.1", "--out", out, "--out", plan,
+        "place", cell, "--within", "x=-0.1,0.1", "--within", "y=0,0.1", "--out", out, "--out", plan,
         "--map", page, "--points", "2",
     )  # fmt: skip
     assert code == 0, told
@@ -354,7 +354,7 @@ def test_a_job_is_placed_as_a_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """Its file at the place says the same of every seam, moved; what is on the part goes along."""
     (tmp_path / "job.toml").write_text(JOB)
     out = tmp_path / "there.toml"
-    ranges = ("--x", "-0.05,0.05", "--y", "-0.05,0.05")
+    ranges = ("--within", "x=-0.05,0.05", "--within", "y=-0.05,0.05")
 
     def one_place(places: Places, *_: object) -> tuple[Tried, list[Tried]]:
         found = places.tried(np.array([0.02, 0.01]))
@@ -412,7 +412,7 @@ def test_a_job_in_the_frame_of_a_base_is_written_where_it_was_placed(
     monkeypatch.setattr(
         importlib.import_module("selfmotion.work.placement.place"), "best_place", one_place
     )
-    code, text = invoke("place", tmp_path / "job.json", "--x", "-0.05,0.05", "--out", out)
+    code, text = invoke("place", tmp_path / "job.json", "--within", "x=-0.05,0.05", "--out", out)
     assert code == 0, text
     starts = []
     for file in (tmp_path / "job.json", out):
@@ -427,7 +427,7 @@ def test_a_job_in_the_frame_of_a_base_is_written_where_it_was_placed(
     [
         (JOB, ("--part", "wall", "--part", "clamp"), "to which belongs clamp, not wall, clamp"),
         (JOB, ("--part", "wall"), "to which belongs clamp, not wall"),
-        (JOB, ("--path-alone",), "to which belongs clamp, not nothing"),
+        (JOB, ("--of", "path"), "to which belongs clamp, not nothing"),
         (
             JOB.replace('name = "panda"', 'name = "panda"\nreference = "panda_link0"', 1).replace(
                 "[workpiece]", '[workpiece]\non = "panda_link0"'
@@ -451,7 +451,7 @@ def test_a_job_that_cannot_be_written_as_placed_is_refused_before(
 ) -> None:
     (tmp_path / "job.toml").write_text(text)
     out = tmp_path / "there.toml"
-    asked = ("place", tmp_path / "job.toml", "--x", "-0.05,0.05", *options, "--out", out)
+    asked = ("place", tmp_path / "job.toml", "--within", "x=-0.05,0.05", *options, "--out", out)
     assert said in " ".join(complaint(*asked).split())
     assert not out.exists()
 

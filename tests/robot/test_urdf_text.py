@@ -11,7 +11,7 @@ from selfmotion.model.robot import Packages, urdf_text
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload
 from support.files_of_people import arm, chain_elements, described_package, with_arguments
-from support.shell import complaint, invoke
+from support.shell import complaint, invoke, on_circle
 
 UP = [0.0, 0.0, 1.2]
 _SHAPE = '<geometry><box size=".05 .05 .05"/></geometry>'
@@ -109,7 +109,7 @@ def test_what_is_not_found_is_named_with_where_it_was_looked_for(tmp_path: Path)
     ) as no:
         sm.load_robot(file)
     assert str(tmp_path) in str(no.value)
-    assert "--packages DIR" in str(no.value)
+    assert "robot.packages=DIR" in str(no.value)
     mesh = '<geometry><mesh filename="package://hand/a.stl"/></geometry>'
     file = tmp_path / "arm.urdf"
     file.write_text(arm(f"<collision>{mesh}</collision>"))
@@ -183,18 +183,19 @@ def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:
     file, out = with_arguments(tmp_path), tmp_path / "arm.toml"
     said = complaint("init", file, "--out", out)
     assert 'name (default "arm"), reach (default "")' in said
-    assert "--argument NAME=VALUE" in said
-    said = complaint("init", file, "--out", out, "--argument", "name=arm")
+    assert "robot.arguments.NAME=VALUE" in said
+    said = complaint("init", file, "--out", out, "--set", "robot.arguments.name=arm")
     assert 'reach (default "")' in said
-    said = complaint("plan", file, "--circle", "0.02", "--argument", "nam=arm")
+    said = complaint("plan", file, *on_circle("0.02"), "--set", "robot.arguments.nam=arm")
     assert "has no argument 'nam'; nearest: 'name'" in said
-    given = ("--argument", "name=arm", "--argument", "reach=0.3")
-    assert invoke("init", file, "--out", out, *given, "--lock", "j3=0.1")[0] == 0
+    given = ("--set", "robot.arguments.name=arm", "--set", "robot.arguments.reach=0.3")
+    assert invoke("init", file, "--out", out, *given, "--set", "robot.lock.j3=0.1")[0] == 0
     robot = sm.files.read_job(out).problem.robot
     assert robot.dof == 6
     assert robot.locked == {"j3": 0.1}
     np.testing.assert_allclose(robot.model.jointPlacements[1].translation, [0, 0, 0.3])
-    assert "is 'reach', expected NAME=VALUE" in complaint("plan", file, "--argument", "reach")
+    said = complaint("plan", file, "--set", "robot.arguments.reach")
+    assert "is 'robot.arguments.reach', expected KEY=VALUE" in said
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import in_length
 from selfmotion.shell.sheet.tables import plan_sections
 from support.arms import robot_named
 from support.replay_plans import two_seams
@@ -69,17 +70,15 @@ def test_numbers_are_those_of_certificate_report_and_margins(plan: sm.Plan, tmp_
     assert not cells.outside
     assert check.verdict.split(":")[0] in page
     path = {row[0]: row for row in cells.tables["Path, at all times"][1:]}
-    assert float(path["position error"][1].split()[0]) == pytest.approx(
-        check.position_error.value, rel=5e-3
-    )
+    assert path["position error"][1] == in_length(check.position_error.value, 4)
     near = {row[0]: row for row in cells.tables["Closest approaches"][1:]}
     for name, found in plan.approaches.items():
-        assert float(near[name][1].split()[0]) == pytest.approx(1e3 * found.value, rel=1e-3)
+        assert near[f"closest to {name}"][1] == in_length(found.value, 4)
     turned = cells.tables["Joint reversals"][1:]
     assert sum(int(row[1]) for row in turned if row[1]) == plan.reversals.count
     wide = cells.tables["How far it may be off while the program runs unchanged"][1:]
     assert len(wide) == 9
-    assert wide[0][2] == margins.part.translation.size
+    assert wide[0][1] == margins.part.translation.size
     kept = cells.tables["Requirements, at all times"][1:]
     assert len(kept) == len([item for item in check.findings if item.requirement != "feed"])
     assert {row[-1] for row in kept} == {"kept"}
@@ -174,7 +173,7 @@ def test_of_a_program_seams_events_and_moves_are_told(tmp_path: Path) -> None:
     kept = tables["Requirements, at all times of each seam"][1:]
     assert {row[0] for row in kept} == set(program.order)
     wide = tables[f"Seam '{first}': How far it may be off while the program runs unchanged"][1:]
-    assert wide[0][2] == margins[first].part.translation.size
+    assert wide[0][1] == margins[first].part.translation.size
 
 
 def test_margins_of_programs_are_of_their_seams(plan: sm.Plan, tmp_path: Path) -> None:
@@ -216,7 +215,7 @@ def _not_found(made: sm.Plan | sm.Move) -> sm.Move:
 def test_sheets_of_programs_from_the_shell(tmp_path: Path) -> None:
     file, page = tmp_path / "two.program", tmp_path / "sheet.html"
     two_seams().save(file)
-    code, told = invoke("sheet", file, "-o", page, "--part-number", "47", "--order-number", "8")
+    code, told = invoke("sheet", file, "-o", page, "--number", "part=47", "--number", "order=8")
     assert code == 0, told
     text = page.read_text()
     assert "part 47 · order 8" in text

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.shell.cli.options import read_obstacles
+from selfmotion.shell.documents import parse_setting, plan_request_of, set_key
 from support.files_of_people import finger, with_arguments_text
 
 # Numbers that no file means, and tokens that stand where numbers should.
@@ -145,8 +145,8 @@ def good_files() -> tuple[Good, ...]:
         Good("URDF", ".urdf", finger().encode(), lambda file: sm.load_robot(file, tool="tip")),
         Good("motion", ".yaml", _POINTS, sm.files.read_motion),
         Good("SRDF", ".srdf", _SRDF, lambda file: sm.constraints.Clearance(srdf=file)),
-        Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), read_obstacles),
-        Good("obstacles", ".toml", _OBSTACLES_TOML, read_obstacles),
+        Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), _obstacles),
+        Good("obstacles", ".toml", _OBSTACLES_TOML, _obstacles),
         Good("limits", ".yaml", _LIMITS, lambda file: sm.files.read_joint_limits(file, arm)),
     ]
     with tempfile.TemporaryDirectory() as name:
@@ -396,6 +396,22 @@ def _packed_gigabyte() -> tuple[bytes, int, int]:
 def _kind(suffix: str) -> str:
     kinds = {".nc": "cut", ".apt": "cut", ".dxf": "drawing"}
     return kinds.get(suffix, "path")
+
+
+# Arms of problems, which are loaded once.
+_arms: dict[str, object] = {}
+
+
+def _obstacles(file: Path) -> object:
+    """Read obstacles as `--set clearance.obstacles=@FILE` does."""
+    document = {
+        "robot": {"name": "panda"},
+        "path": {"kind": "circle", "radius": 0.1, "normal": [0, 0, 1], "duration": 2.0},
+        "start": "dexterous",
+        "clearance": {"distance": 0.01},
+    }
+    set_key(document, *parse_setting(f"clearance.obstacles=@{file}", file.parent))
+    return plan_request_of(document, file, cache=_arms).problem.clearance
 
 
 def _path(file: Path) -> object:

@@ -46,3 +46,14 @@ def complaint(*arguments: str | Path) -> str:
     (line,) = printed.getvalue().strip().splitlines()
     assert line.startswith("error: ")
     return line
+
+
+def on_circle(radius: float | str, axis: str = "x", pace: str = "duration=4") -> tuple[str, str]:
+    """Return the option of a circle [m] about an axis, from where the arm starts."""
+    normal = [int(axis == name) for name in "xyz"]
+    return "--set", f'path={{kind="circle", radius={radius}, normal={normal}, {pace}}}'
+
+
+def on_line(by: str, pace: str = "duration=4") -> tuple[str, str]:
+    """Return the option of a straight line by dx,dy,dz [m], from where the arm starts."""
+    return "--set", f'path={{kind="line", by=[{by}]{pace and ", "}{pace}}}'

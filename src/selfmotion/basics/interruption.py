@@ -1,4 +1,10 @@
-"""Counters of work, and its interruption by Ctrl-C."""
+"""Counters of work, and its interruption by Ctrl-C.
+
+Ctrl-C while compiled code runs is noted at once, and obeyed between two steps of the work. Python
+raises KeyboardInterrupt wherever the main thread happens to be: within the call of a compiled
+kernel that ends as a fault of the call (`SystemError`: a result with an exception set), within its
+compilation it is lost.
+"""
 
 import signal
 import threading

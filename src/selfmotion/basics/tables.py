@@ -137,7 +137,11 @@ def _header(
             else:
                 return titles, remaining, before[-1][0]
     known = usual.get(len(cells))
-    add = f"add {known} (or say --columns {known})" if known else "add one that names its columns"
+    add = (
+        f"add {known} (or say --set path.columns={known})"
+        if known
+        else "add one that names its columns"
+    )
     raise FileFormatError(f"{file}: line {line}: has no header, only numbers; {add}")
 
 

@@ -60,9 +60,10 @@ def overlap_warning(arm: RobotModel, model: CollisionModel) -> str:
         return ""
     found = often | overlapping_by_design(arm, model.disabled)
     listed = "; ".join(f"{one} - {other}: these links {why}" for (one, other), why in found.items())
-    options = " ".join(f"--disabled {one},{other}" for one, other in found)
+    pairs = ", ".join(f'["{one}", "{other}"]' for one, other in found)
+    options = f"--set 'clearance.disabled=[{pairs}]'"
     lines = "".join(srdf_line(one, other) for one, other in found)
     return (
         f"{listed}. If that is how they are made, leave them out: {options} (init writes them into "
-        f"its file), or by an SRDF (srdf=, --srdf) with {lines}"
+        f"its file), or by an SRDF (srdf=, --set clearance.srdf=FILE) with {lines}"
     )

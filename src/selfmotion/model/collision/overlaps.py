@@ -194,9 +194,10 @@ class Overlap:
     @property
     def remedy(self) -> str:
         """Share of configurations, and the remedy for an overlap by design."""
+        pair = f'["{self.first}", "{self.second}"]'
         return (
             f"these links overlap in {100 * self.share:.0f} % of all configurations: if that is "
-            f"how they are made, leave them out: --disabled {self.first},{self.second}, or srdf= a "
+            f"how they are made, leave them out: --set 'clearance.disabled=[{pair}]', or srdf= a "
             f"file with {srdf_line(self.first, self.second)}"
         )
 

@@ -1,4 +1,9 @@
-"""Fewest straight legs through poses, within tolerances."""
+"""Simplification: poses that the legs of a polyline pass within a tolerance are left out.
+
+By the algorithm of Ramer (1972), Douglas and Peucker (1973): a leg from the first pose to the last
+is divided at its farthest pose, until none is farther than the tolerance. A pose from which the
+tool goes back along the leg, or that is turned otherwise, divides it as well.
+"""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def _place(urdf: Urdf, file: str) -> Path | None:
 
 
 # Clause about an address on another machine.
-_ELSEWHERE = " here; name the folder that has its package: --packages DIR (packages=)"
+_ELSEWHERE = " here; name the folder that has its package: --set robot.packages=DIR (packages=)"
 
 
 def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
@@ -143,7 +143,7 @@ _terminal = threading.Lock()
 _drawn = coal.CachedMeshLoader()
 
 # Remedy for missing bodies.
-_BARE = "; or go on without looking at self-collision: --no-self-collision (clearance = false)"
+_BARE = "; or go on without looking at self-collision: --set clearance=false"
 
 
 def full_model(urdf: Urdf) -> Any:

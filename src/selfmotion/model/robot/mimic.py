@@ -1,4 +1,8 @@
-"""Joints that mimic other ones."""
+"""Joints that mimic others: several joints of a model that are one coordinate of an arm.
+
+A model has N joints, an arm n ≤ N coordinates: q_model = C q + c, with a row of C for each joint of
+the model, in which one number is not 0 (``<mimic joint="…" multiplier="…" offset="…"/>``).
+"""
 
 from __future__ import annotations
 

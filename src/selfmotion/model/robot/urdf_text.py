@@ -1,4 +1,15 @@
-"""From a file to the text of a URDF: its packages, and files that are no URDF."""
+"""From a file to the text of a URDF: its packages, and files that are no URDF.
+
+Packages and files that robot descriptions name are found on this machine without ROS.
+``$(find NAME)`` of xacro, ``package://NAME/…``, ``model://NAME/…``, ``file://`` and absolute paths
+of the machine that wrote a file, and relative paths: all are looked up here, in this order, the
+nearest first:
+
+1. folders that are given (``packages=``), and three levels below them
+2. the folders above the file: one of that name, or whose ``package.xml`` says so, or one beside it
+3. ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below
+4. three levels below the folders above the file, up to six of them, or to the root of a repository
+"""
 
 import itertools
 import os
@@ -66,7 +77,7 @@ class Packages:
         return (
             f"package '{name}' is in none of {given}{self.file.resolve().parent} and the folders "
             f"above it, {_BELOW} levels below the nearest of these, {known}; name the folder that "
-            f"has it: --packages DIR (packages=)"
+            f"has it: --set robot.packages=DIR (packages=)"
         )
 
     def called_otherwise(self, name: str, inside: str) -> str:
@@ -81,7 +92,7 @@ class Packages:
         return (
             f"package '{name}' is nowhere, but {folder} has {inside} and is called '{said}': "
             f"rename it, or link to it by that name (ln -s {folder} DIR/{name}) and give "
-            f"--packages DIR (packages=)"
+            f"--set robot.packages=DIR (packages=)"
         )
 
     @cached_property

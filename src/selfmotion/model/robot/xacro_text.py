@@ -203,7 +203,9 @@ class _Declared:
             f"{name} (no default)" if default is None else f'{name} (default "{default}")'
             for name, default in self.defaults.items()
         )
-        return f"its arguments: {listed}; give them with --argument NAME=VALUE (arguments=)"
+        return (
+            f"its arguments: {listed}; give them with --set robot.arguments.NAME=VALUE (arguments=)"
+        )
 
 
 @contextlib.contextmanager

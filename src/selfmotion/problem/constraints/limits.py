@@ -83,7 +83,7 @@ class JointPositionLimits(Constraint):
                 raise ProblemError(
                     f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}' has lower = upper = "
                     f"{lower[k]:.6g}: it does not move; hold it there: lock = {{{name!r}: "
-                    f"{lower[k]:.6g}}} of the robot (--lock {name}={lower[k]:.6g})"
+                    f"{lower[k]:.6g}}} of the robot (--set robot.lock.{name}={lower[k]:.6g})"
                 )
             raise ProblemError(
                 f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': lower "

@@ -6,9 +6,10 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
@@ -26,6 +27,7 @@ import selfmotion as sm
 from selfmotion.basics import seconds_waited_for_kernels, version
 from selfmotion.planning.optimise import Iteration
 from selfmotion.shell.cli import tables
+from selfmotion.shell.cli.moved import moved
 from selfmotion.shell.cli.summaries import in_shell
 
 if TYPE_CHECKING:
@@ -254,7 +256,6 @@ LOOP, BEGIN = "While the arm moves", "To begin with"
 app = typer.Typer(
     help="Plan the joint motion of a redundant arm along a tool motion.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -294,6 +295,10 @@ def main() -> None:
     as well, see `error_json`.
     """
     as_json = "--json" in sys.argv[1:]
+    instead = moved(sys.argv[1:])
+    if instead:
+        _fail(sm.errors.ProblemError(instead), instead, as_json)
+        sys.exit(BAD_INPUT)
     try:
         code = app(standalone_mode=not as_json)
     except SystemExit as end:
@@ -352,6 +357,15 @@ _PLAIN = (str, int, float, bool, type(None))
 def print_json(data: Any) -> None:
     """Print values as JSON, which has no infinite numbers: they are null."""
     terminal.print_json(data=_finite(data), allow_nan=False)
+
+
+def print_written(files: Sequence[Path], as_json: bool = False) -> None:
+    """Print which files were written."""
+    if as_json:
+        print_json({"written": [str(file) for file in files]})
+        return
+    for file in files:
+        terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
 def _finite(value: Any) -> Any:

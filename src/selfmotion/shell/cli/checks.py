@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 import typer
@@ -11,53 +12,38 @@ import typer
 import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
-from selfmotion.model.collision import srdf_notes
-from selfmotion.problem.constraints import NO_OVERLAP
-from selfmotion.problem.problem import OF_MAKER
-from selfmotion.shell.cli import options
+from selfmotion.shell.cli import documents
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
-from selfmotion.shell.documents import joint_limit_notes, read_joint_limits
 from selfmotion.shop import controllers
 
 _Near = Mapping[str, Extreme]
 
 
-def requirements(
-    robot: sm.RobotModel,
-    velocity: str | None,
-    acceleration: str | None,
-    joint_limits: Path | None,
-    obstacles: Path | None,
-    clearance: float,
-    srdf: Path | None,
-    disabled: list[str] | None,
-    *,
-    usual: bool = False,
-    apart: bool = False,
-) -> tuple[sm.certificate.Requirement, ...]:
-    """Return what a motion of others has to keep besides its path and the arm's own limits.
+class Wanted(NamedTuple):
+    """What a motion is judged by.
 
-    With what `plan` keeps `usual`ly, accelerations and jerks of the arm's maker, and the arm
-    `apart` from itself.
+    Attributes
+    ----------
+    problem : Problem
+    tolerance : Tolerance or None
+    ending : str
+        Of a plan, why it ended before its path.
+    plan : Plan or None
+        The plan that it comes from.
+    notes : tuple of str
+    said : Said
+        What is asked besides.
+    task : Task or None
+        In place of the problem's, where that leaves no joint to spare.
     """
-    constraints: list[sm.constraints.Constraint] = []
-    if usual:
-        constraints += [item for item in OF_MAKER if item.applies(robot)]
-    if velocity is not None:
-        most = options.one_or_each(velocity, "--velocity")
-        constraints.append(sm.constraints.JointVelocityLimits(most))
-    if acceleration is not None:
-        most = options.one_or_each(acceleration, "--acceleration")
-        constraints.append(sm.constraints.JointAccelerationLimits(most))
-    if joint_limits is not None:
-        constraints += read_joint_limits(joint_limits, robot)
-    if obstacles is not None or clearance != 0.0 or srdf is not None or disabled:
-        bodies = () if obstacles is None else options.read_obstacles(obstacles)
-        pairs = tuple((one, other) for one, other in options.disabled_pairs(disabled))
-        constraints.append(sm.constraints.Clearance(bodies, clearance, srdf, pairs))
-    elif apart and robot.urdf.has_collisions:
-        constraints.append(NO_OVERLAP)
-    return tuple(item.requirement(robot) for item in constraints)
+
+    problem: sm.Problem
+    tolerance: sm.Tolerance | None = None
+    ending: str = ""
+    plan: sm.Plan | None = None
+    notes: tuple[str, ...] = ()
+    said: documents.Said = documents.Said()
+    task: sm.Task | None = None
 
 
 class Read(NamedTuple):
@@ -106,24 +92,6 @@ def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.Robot
     return Read(motion, within, program)
 
 
-def notes_of(
-    file: Path,
-    degrees: bool,
-    robot: sm.RobotModel,
-    joint_limits: Path | None,
-    obstacles: Path | None,
-    srdf: Path | None,
-) -> tuple[str, ...]:
-    """Return what is taken for granted, or passed over, of the files of a check."""
-    bodies = () if obstacles is None else options.read_obstacles(obstacles)
-    return (
-        *([] if is_program(file) else controllers.motion_notes(file, degrees=degrees)),
-        *([] if joint_limits is None else joint_limit_notes(joint_limits, robot)),
-        *([] if srdf is None else srdf_notes(srdf)),
-        *(body.note for body in bodies if isinstance(body, sm.obstacles.Mesh) and body.note),
-    )
-
-
 def is_program(file: Path) -> bool:
     """Whether a file is a program of a controller."""
     return file.suffix.lower() in controllers.READ_PROGRAMS
@@ -165,44 +133,37 @@ def print_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
 
 
 def of_plan(
-    file: Path,
+    plan: sm.Plan,
+    said: documents.Said,
     within: sm.Tolerance | None,
-    judged: tuple[Any, ...],
     progress: Progress,
-    calibration: Path | None = None,
+    calibration: Path | None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the certificate of a plan, how near bodies come, and the arm."""
-    plan = sm.load_plan(file, progress=progress)
+    problem = documents.changed(plan.problem, said)
     if calibration is not None:
-        problem = on_calibrated(plan.problem, calibration)
-        besides = requirements(problem.robot, *judged)
-        certificate = problem.certify(
-            plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
-        )
+        problem = on_calibrated(problem, calibration)
         print_difference(problem.robot, plan.trajectory)
-        all_requirements = (*problem.requirements, *besides)
-        return certificate, near(problem.robot, plan.trajectory, all_requirements), problem.robot
-    besides = requirements(plan.robot, *judged)
-    close = near(plan.robot, plan.trajectory, (*plan.requirements, *besides))
-    if within is None and not any(judged):
-        return plan.certificate, close, plan.robot
-    return plan.check(within, besides, progress=progress), close, plan.robot
+    close = near(problem.robot, plan.trajectory, problem.requirements)
+    if problem is not plan.problem:
+        certificate = problem.certify(
+            plan.trajectory, within or plan.tolerance, plan.report.ending, (), progress
+        )
+    else:
+        certificate = plan.certificate if within is None else plan.check(within, progress=progress)
+    return certificate, close, problem.robot
 
 
 def of_problem(
     file: Path,
-    asked: str,
+    asked: Wanted,
     degrees: bool,
     within: sm.Tolerance | None,
-    judged: tuple[Any, ...],
     progress: Progress,
-    calibration: Path | None = None,
+    calibration: Path | None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel, controllers.ControllerProgram | None]:
-    """Return the same of a motion by all that a problem file or a plan asks.
-
-    And the program that it is.
-    """
-    problem, tolerance, ending, plan = _asked_by(Path(asked), progress)
+    """Return the same of a motion by all that a problem asks, and the program that it is."""
+    problem, tolerance, ending, plan = asked[:4]
     content = read(file, degrees, within, problem.robot)
     if plan is not None and content.program is None:
         slower = controllers.slowed_as(plan, content.motion)
@@ -213,7 +174,7 @@ def of_problem(
                 f"times as long, as export --rate writes it"
             )
             stages.print(text, markup=False, soft_wrap=True)
-            problem = slower.problem
+            problem = documents.changed(slower.problem, asked.said)
     motions, program = content.ways(problem.path, problem.robot), content.program
     against = content.besides(problem.robot, problem.constraints)
     if program is not None:
@@ -225,35 +186,21 @@ def of_problem(
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         print_difference(problem.robot, motions[0])
-    besides = requirements(problem.robot, *judged)
     allowed, robot = content.within or tolerance, problem.robot
-
-    def certify(motion: sm.Trajectory) -> sm.Certificate:
-        return problem.certify(motion, allowed, ending, besides, progress)
-
     lines = replace(problem, constraints=controllers.constraints_of_lines(problem.constraints))
 
-    def certify_lines(motion: sm.Trajectory) -> sm.Certificate:
-        return lines.certify(motion, allowed, ending, besides, progress)
+    def certify(each: sm.Problem, motion: sm.Trajectory) -> sm.Certificate:
+        if asked.task is None:
+            return each.certify(motion, allowed, ending, (), progress)
+        all_asked = each.requirements
+        return sm.certify(
+            robot, each.path, asked.task, motion, allowed, all_asked, progress=progress
+        )
 
-    certificate, motion = controllers.judged_interpolations(motions, certify, certify_lines)
+    ways = (partial(certify, each) for each in (problem, lines))
+    certificate, motion = controllers.judged_interpolations(motions, *ways)
     certificate = with_failures(certificate, against)
-    close = near(robot, motion, (*problem.requirements, *besides))
-    return certificate, close, robot, program
-
-
-def _asked_by(
-    file: Path, progress: Progress
-) -> tuple[sm.Problem, sm.Tolerance | None, str, sm.Plan | None]:
-    """Return the problem of a problem file or of a saved plan, its tolerance, how that ended.
-
-    And the plan, where it is one.
-    """
-    if file.suffix == ".npz":
-        plan = sm.load_plan(file, progress=progress)
-        return plan.problem, plan.tolerance, plan.report.ending, plan
-    job = sm.files.read_job(file)
-    return job.problem, job.tolerance, "", None
+    return certificate, near(robot, motion, problem.requirements), robot, program
 
 
 def near(

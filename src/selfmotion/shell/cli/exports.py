@@ -1,5 +1,6 @@
 """The command that writes motions for controllers and simulators."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -28,22 +29,9 @@ from selfmotion.shop.controllers import FORMS
     rich_help_panel=FILES,
 )
 def export(
-    file: Annotated[
-        Path, typer.Argument(help="A plan or a move saved as .npz, a .program or .parts.")
-    ],
-    out: Annotated[
-        list[Path],
-        typer.Option(
-            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .mcap (ROS 2 bag), .xml "
-            "(MuJoCo keyframes), .script (URScript), .src (KUKA), .mod (ABB). Repeatable."
-        ),
-    ],
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            help="Samples per second; by default the plan's own: few, joined by quintics."
-        ),
-    ] = None,
+    file: options.PlanArgument,
+    out: options.OutOption = None,
+    rate: options.RateOption = None,
     form: Annotated[
         str | None,
         typer.Option("--format", help=f"Format, whatever the suffix: {', '.join(FORMS)}."),
@@ -55,21 +43,24 @@ def export(
             help="For a cell: also a file for each part (not of programs).",
         ),
     ] = False,
-    settings: outputs.SettingsOption = None,
-    targets: outputs.TargetsOption = None,
-    wobj: outputs.WorkObjectOption = None,
-    mass: outputs.MassOption = None,
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Write it even if it is not verified, or moves at an end."),
-    ] = False,
+    settings: options.SettingsOption = None,
+    changes: options.SetOption = None,
+    force: options.ForceOption = False,
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write a plan's motion for controllers and simulators, and verify the file."""
-    asked = outputs.program_settings(settings, targets, wobj, mass)
+    """Write a plan's motion for controllers and simulators, and verify the file.
+
+    By --set, keys of --settings: targets=poses (linear and circular motions in a work object at
+    the feed, which can be shifted and touched up; joints; timed-poses, at the plan's times), mass
+    [kg], work_object (path, the frame that the path is given in; a link; or a pose, in the frame
+    of the controller's link base).
+    """
+    if not out:
+        raise sm.errors.ProblemError("give the file to write: --out motion.yaml")
+    asked = outputs.program_settings(settings, changes)
     files = _Files(tuple(out), form, asked, parts, force, verbose or as_json)
-    files.check(rate, settings, {"targets": targets, "wobj": wobj, "mass": mass})
+    files.check(rate, settings, changes or [])
     planned = _loaded(file, parts=parts)
     _check_verified(planned, force, as_json)
     _print_mimic_joints(planned.robot, out, form)
@@ -137,7 +128,7 @@ class _Files:
     force: bool
     whole: bool
 
-    def check(self, rate: float | None, settings: object, typed: dict[str, object | None]) -> None:
+    def check(self, rate: float | None, settings: object, changes: Sequence[str]) -> None:
         """Raise ProblemError for options that are of none of the files."""
         all_programs = all(map(self.is_program, self.targets))
         if rate is not None and all_programs:
@@ -155,11 +146,10 @@ class _Files:
             raise sm.errors.ProblemError(
                 "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
             )
-        names = ", ".join(f"--{name}" for name, value in typed.items() if value)
-        if names:
+        if changes:
             raise sm.errors.ProblemError(
-                f"{names}: of controllers' programs (.script, .src, .mod), of which none is asked "
-                f"for"
+                f"--set {changes[0]}: is of controllers' programs (.script, .src, .mod), of which "
+                f"none is asked for"
             )
 
     def is_program(self, target: Path) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any, NoReturn
 
 import typer
 
@@ -45,52 +45,32 @@ TIMETABLE = ".timetable.csv"
     rich_help_panel=PLAN,
 )
 def job(
-    file: Annotated[Path, typer.Argument(help="A job file: a problem file with seams.")],
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="File: .program (all of it), .timetable.csv (what happens when), or the motion "
-            "as `export` writes it. Repeatable."
-        ),
-    ] = None,
+    file: options.DocumentArgument,
+    out: options.OutOption = None,
     html: options.HtmlOption = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option(help="Folder for finished work; a job that was stopped resumes from it."),
-    ] = None,
-    before: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            help="An earlier .program of this job, or of one like it: what did not change is kept, "
-            "the rest begins at its motions.",
-        ),
-    ] = None,
-    deadline: Annotated[
-        float | None,
-        typer.Option(
-            help="Stop after this many seconds by the clock; --folder keeps what is done."
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
-    dask: Annotated[
-        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
-    ] = None,
-    settings: outputs.SettingsOption = None,
+    folder: options.FolderOption = None,
+    before: options.FromOption = None,
+    deadline: options.DeadlineOption = None,
+    workers: options.WorkersOption = None,
+    dask: options.DaskOption = None,
+    settings: options.SettingsOption = None,
     changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Plan many seams as one program: order, directions, and the moves in between."""
+    """Plan many seams as one program: order, directions, and the moves in between.
+
+    A .timetable.csv as --out says what happens when. A job that was stopped goes on from --folder.
+    """
     wanted = [*(out or []), *([] if html is None else [html])]
     _check_wanted(wanted, settings)
-    check_cluster(dask, workers if workers > 1 else None)
+    check_cluster(dask, workers)
     # Ctrl-C while kernels are loaded is lost, unless it is noted.
     with basics.held_interruption():
-        work = documents.seams_of_file(file, changes or [], allow_code)
+        work = documents.seams_of_file(file, changes, allow_code)
         earlier = None if before is None else sm.load_program(before)
-        program_settings = None if settings is None else sm.files.read_program_settings(settings)
+        program_settings = outputs.program_settings(settings)
         # Before anything is planned.
         _check_programs(work, wanted, program_settings)
         remarks = work.remarks
@@ -104,11 +84,13 @@ def job(
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 
-def _planned(work: SeamJob, kept: Path, dask: str | None, workers: int, **given: Any) -> sm.Program:
+def _planned(
+    work: SeamJob, kept: Path, dask: str | None, workers: int | None, **given: Any
+) -> sm.Program:
     """Return the program of a job, on a cluster or in processes; what is finished is `kept`."""
     from selfmotion.work.batch import processes
 
-    here: Any = processes(workers) if workers > 1 else nullcontext()
+    here: Any = processes(workers) if workers and workers > 1 else nullcontext()
     try:
         with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
             return work.plan(folder=kept, executor=cluster or pool, progress=display.stage, **given)

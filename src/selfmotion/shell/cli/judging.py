@@ -1,10 +1,10 @@
-"""What `selfmotion check` judges, and by what: a plan, a problem file, or options."""
+"""What `selfmotion check` judges, and by what: a plan, a problem file, or a robot and a path."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import selfmotion as sm
 from selfmotion.basics import Progress
@@ -35,19 +35,41 @@ class Judged(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
+def tolerance_of(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
+    """Return the tolerance that is asked for; one number counts for both."""
+    if tolerance is None and turn is not None:
+        raise sm.errors.ProblemError("--turn is beside --tolerance, which is not given")
+    if tolerance is None:
+        return None
+    return sm.Tolerance(tolerance, tolerance if turn is None else turn)
+
+
+# Keys of a robot alone: a motion from elsewhere may begin and end while it moves.
+_OF_OTHERS = {"start": "free", "rest": False}
+
+
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """A file to check, and the options of the command.
+    """A file to check, and what it is judged by.
 
     Attributes
     ----------
     file : Path
-    given : mapping
-        Options by the name of their parameter.
+    robot : str or None
+        A robot, a problem file, a plan, or a job's program.
+    said : Said
+        What else is asked of the motion.
+    calibration : Path or None
+    degrees : bool
+    within : Tolerance or None
     """
 
     file: Path
-    given: Mapping[str, Any]
+    robot: str | None
+    said: documents.Said
+    calibration: Path | None
+    degrees: bool
+    within: sm.Tolerance | None
 
     @property
     def is_job(self) -> bool:
@@ -57,104 +79,62 @@ class Asked:
     @property
     def is_of_program(self) -> bool:
         """Whether it is judged by the program of a job."""
-        robot = self.given["robot"]
-        return robot is not None and Path(robot).suffix == jobs.PROGRAM
-
-    @property
-    def within(self) -> sm.Tolerance | None:
-        """The tolerance that is asked for."""
-        tolerance = self.given["tolerance"]
-        return None if tolerance is None else sm.Tolerance(tolerance, tolerance)
-
-    @cached_property
-    def _limits(self) -> tuple[Any, ...]:
-        """What is to be kept besides, as `checks.requirements` takes it."""
-        names = ("velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf")
-        return (*(self.given[name] for name in names), self.given["disabled"])
-
-    @cached_property
-    def _of_motion(self) -> dict[str, Any]:
-        """Options that say what the motion is of, by their names; None where they are not given."""
-        typed = {name: self.given[name] for name in ("path", *documents.OF_PATH)}
-        typed["flip_normals"] = typed["flip_normals"] or None
-        options = {name.replace("_", "-"): value for name, value in typed.items()}
-        options |= {name: self.given[name] for name in ("task", "tool", "reference")}
-        options |= {name: self.given[name] or None for name in ("lock", "argument", "packages")}
-        return options | {"no-self-collision": self.given["no_collision"] or None}
+        return self.robot is not None and Path(self.robot).suffix == jobs.PROGRAM
 
     def refuse_others(self) -> None:
         """Raise ProblemError for options that have no effect, since a file says it."""
-        given, file = self.given, self.file
-        besides = {"calibration": given["calibration"], "degrees": given["degrees"] or None}
-        limits = {"limits": any(self._limits) or None}
+        besides = {"calibration": self.calibration, "degrees": self.degrees}
         if self.is_job:
-            whose = "the program's" if file.suffix == jobs.PROGRAM else "the parts'"
-            more = {"robot": given["robot"], "tolerance": given["tolerance"]}
-            options.refuse(self._of_motion | besides | more | limits, file, whose)
+            whose = "the program's" if self.file.suffix == jobs.PROGRAM else "the parts'"
+            more = {"robot": self.robot, "tolerance": self.within}
+            options.refuse(self.said.typed | besides | more, self.file, whose)
         elif self.is_of_program:
-            options.refuse(self._of_motion | besides | limits, given["robot"], "the program's")
+            options.refuse(self.said.typed | besides, str(self.robot), "the program's")
+        elif self.file.suffix == ".npz":
+            own = {"robot": self.robot, "degrees": self.degrees}
+            options.refuse(own, self.file, "the plan's")
 
     def judged(self, progress: Progress) -> Judged:
         """Return the certificate of the motion, by whatever says what is asked of it."""
-        given, file, robot = self.given, self.file, self.given["robot"]
-        if file.suffix == ".npz":
-            own = {"robot": robot, "degrees": given["degrees"] or None}
-            options.refuse(self._of_motion | own, file, "the plan's")
-            return Judged(
-                *checks.of_plan(file, self.within, self._limits, progress, given["calibration"])
-            )
-        if robot is not None and Path(robot).suffix in (".npz", *documents.SUFFIXES):
-            whose = "the plan's" if Path(robot).suffix == ".npz" else "the problem's"
-            options.refuse(self._of_motion, robot, whose)
-            certificate, near, arm, program = checks.of_problem(
-                file,
-                robot,
-                given["degrees"],
-                self.within,
-                self._limits,
-                progress,
-                given["calibration"],
-            )
-            return Judged(certificate, near, arm, program, self._notes(arm))
-        return self._by_options(progress)
+        if self.file.suffix == ".npz":
+            plan = sm.load_plan(self.file, progress=progress)
+            return Judged(*checks.of_plan(plan, self.said, self.within, progress, self.calibration))
+        asked = self._asked(progress)
+        certificate, near, arm, program = checks.of_problem(
+            self.file, asked, self.degrees, self.within, progress, self.calibration
+        )
+        notes = () if program else controllers.motion_notes(self.file, degrees=self.degrees)
+        return Judged(certificate, near, arm, program, (*notes, *asked.notes))
 
-    def _by_options(self, progress: Progress) -> Judged:
-        """Return the certificate of a motion along a path, both of which options name."""
-        given, file = self.given, self.file
-        if given["robot"] is None or given["path"] is None:
+    def _asked(self, progress: Progress) -> checks.Wanted:
+        """Return what is asked of a motion of others."""
+        if self.robot is None:
             raise sm.errors.ProblemError(
-                f"{file}: a motion is checked against a robot and a path: give --robot and "
+                f"{self.file}: a motion is checked against a robot and a path: give --robot and "
                 f"--path, or a problem file or a plan (.npz) as --robot (a job's .program "
                 f"for its program)"
             )
-        arm = sm.load_robot(
-            given["robot"],
-            tool=given["tool"],
-            lock=options.locks(given["lock"]),
-            reference=given["reference"],
-            arguments=options.arguments(given["argument"]),
-            packages=given["packages"] or (),
-            calibration=given["calibration"],
-        )
-        read = checks.read(file, given["degrees"], self.within, arm)
-        # Accelerations of a program are the controller's.
-        requirements = checks.requirements(
-            arm, *self._limits, usual=read.program is None, apart=not given["no_collision"]
-        )
-        followed = documents.followed(given["path"], given, arm)
-        task = given["task"] or "pose"
+        if Path(self.robot).suffix == ".npz":
+            plan = sm.load_plan(self.robot, progress=progress)
+            problem, ending = documents.changed(plan.problem, self.said), plan.report.ending
+            return checks.Wanted(problem, plan.tolerance, ending, plan, said=self.said)
+        task = None
+        try:
+            request = documents.read(self.robot, self.said, usual=_OF_OTHERS)
+        except sm.errors.RedundancyError:
+            # Only planning needs a joint to spare: all else is asked as with fewer rows.
+            task = sm.Task.of(self.said.task or "pose")
+            request = self._with_fewer_rows(self.robot)
+        problem = request.problem
+        bodies = (body for each in problem.clearances for body in each.obstacles)
+        meshes = (body.note for body in bodies if isinstance(body, sm.obstacles.Mesh))
+        notes = (*request.notes, *filter(None, meshes))
+        if Path(self.robot).suffix not in documents.SUFFIXES:
+            notes = (*notes, *problem.robot.urdf.notes, *problem.path.notes)
+        return checks.Wanted(problem, request.tolerance, "", None, notes, self.said, task)
 
-        def certify(motion: sm.Trajectory) -> sm.Certificate:
-            return sm.certify(
-                arm, followed, task, motion, read.within, requirements, progress=progress
-            )
-
-        certificate, motion = controllers.judged_interpolations(read.ways(followed, arm), certify)
-        certificate = checks.with_failures(certificate, read.besides(arm, ()))
-        notes = (*self._notes(arm), *arm.urdf.notes, *followed.notes)
-        return Judged(certificate, checks.near(arm, motion, requirements), arm, read.program, notes)
-
-    def _notes(self, arm: sm.RobotModel) -> tuple[str, ...]:
-        given = self.given
-        files = given["joint_limits"], given["obstacles"], given["srdf"]
-        return checks.notes_of(self.file, given["degrees"], arm, *files)
+    def _with_fewer_rows(self, robot: str) -> sm.files.PlanRequest:
+        """Return what is asked of an arm with a joint to spare for fewer rows."""
+        with suppress(sm.SelfmotionError):
+            return documents.read(robot, replace(self.said, task="position"), usual=_OF_OTHERS)
+        return documents.read(robot, replace(self.said, task="planar"), usual=_OF_OTHERS)

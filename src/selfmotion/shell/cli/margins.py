@@ -1,7 +1,7 @@
 """The commands about a cell: how wrong it may be, and where to put the part."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import checks, documents, options, outputs
+from selfmotion.shell.cli import checks, documents, options, outputs, summaries
 from selfmotion.shell.cli.app import (
     LOOK,
     NOT_VERIFIED,
@@ -19,50 +19,32 @@ from selfmotion.shell.cli.app import (
     app,
     plan_with_progress,
     print_json,
+    print_written,
     stages,
     terminal,
 )
 
 # The commands that say how wrong a cell may be.
 
-_NAMES = "may be given several times"
-
-
-_Tolerance = Annotated[
-    float | None,
-    typer.Option(help="Tolerance of the process: deviation of the tool from its path (m)."),
-]
-_Turn = Annotated[
-    float | None,
-    typer.Option(help="Tolerance of the process for the orientation (rad); with --tolerance."),
-]
-_Part = Annotated[
-    list[str] | None,
-    typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
-]
-
 
 @app.command(
     epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK
 )
 def margin(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
-    tolerance: _Tolerance = None,
-    turn: _Turn = None,
+    file: options.PlanArgument,
+    tolerance: options.ToleranceOption = None,
+    turn: options.TurnOption = None,
     clearance: Annotated[
         float, typer.Option(help="Clearance that must remain between bodies (m).")
     ] = 0.0,
-    part: _Part = None,
+    part: options.PartOption = None,
     tool: Annotated[
         list[str] | None,
-        typer.Option(help=f"A body of the tool ({_NAMES}); by default all on its joint."),
-    ] = None,
-    center: Annotated[
-        str | None,
         typer.Option(
-            help="Centre of rotation of the part: x,y,z (m); by default the path's middle."
+            help="A body of the tool (may be given several times); by default all on its joint."
         ),
     ] = None,
+    center: options.CenterOption = None,
     corrected: Annotated[
         bool,
         typer.Option(
@@ -72,8 +54,11 @@ def margin(
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Measure by how much part, tool and base may be displaced before a plan fails."""
-    within = _process(tolerance, turn)
+    """Measure by how much part, tool and base may be displaced before a plan fails.
+
+    Or each seam of a program. --tolerance and --turn are what the process allows.
+    """
+    within = options.process_tolerance(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
     margin_options: dict[str, Any] = {"clearance": clearance, "center": about}
     margin_options |= {"part": part or None, "tool": tool or None}
@@ -113,7 +98,7 @@ def margin(
     rich_help_panel=PLAN,
 )
 def calibrate(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
+    file: options.PlanArgument,
     calibration: Annotated[
         Path,
         typer.Argument(help="Calibration of the arm; see check."),
@@ -123,7 +108,7 @@ def calibrate(
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Check a plan on the calibrated arm, and plan again for that arm."""
+    """Check a plan for the arm as drawn on the calibrated arm, and plan again for that arm."""
     outputs.check_suffixes(out or [])
     planned = sm.load_plan(file)
     problem = sm.calibrated(planned.problem, calibration)
@@ -140,21 +125,23 @@ def calibrate(
     rich_help_panel=LOOK,
 )
 def sheet(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
-        "sheet.html"
-    ),
-    tolerance: _Tolerance = None,
-    turn: _Turn = None,
-    part: _Part = None,
+    file: options.PlanArgument,
+    out: options.OneOutOption = Path("sheet.html"),
+    tolerance: options.ToleranceOption = None,
+    turn: options.TurnOption = None,
+    part: options.PartOption = None,
     title: Annotated[str, typer.Option(help="Title; by default arm and task.")] = "",
-    part_number: Annotated[str, typer.Option(help="Number of the part, to print.")] = "",
-    order_number: Annotated[str, typer.Option(help="Number of the order, to print.")] = "",
+    number: Annotated[
+        list[str] | None,
+        typer.Option(help="Number to print: part=4711-B or order=12. Repeatable."),
+    ] = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write a process sheet: motion, limits kept and margins, to print on A4."""
-    within = _process(tolerance, turn)
+    within = options.process_tolerance(tolerance, turn)
     margins: sm.margins.Margins | dict[str, sm.margins.Margins] | None = None
     planned: sm.Plan | sm.Program
+    printed = _printed(number or [])
     if file.suffix == ".program":
         planned = sm.load_program(file)
         plans = {name: plan for name, plan in planned.plans.items() if _has_margins(plan, within)}
@@ -166,9 +153,27 @@ def sheet(
                 display.stage("measuring margins", 1, 1)
                 margins = sm.margin(planned, within, part=part or None)
     written = sm.files.write_sheet(
-        planned, out, margins, title=title, part_number=part_number, order_number=order_number
+        planned,
+        out or "sheet.html",
+        margins,
+        title=title,
+        part_number=printed.get("part", ""),
+        order_number=printed.get("order", ""),
     )
-    terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+    print_written([written], as_json)
+
+
+def _printed(numbers: Sequence[str]) -> dict[str, str]:
+    """Return the numbers of part and order, by what they are of."""
+    found = {}
+    for text in numbers:
+        name, mark, value = text.partition("=")
+        if name not in ("part", "order") or not mark:
+            raise sm.errors.ProblemError(
+                f"--number is '{text}', expected part=NUMBER or order=NUMBER"
+            )
+        found[name] = value
+    return found
 
 
 def _has_margins(plan: sm.Plan, within: sm.Tolerance | None) -> bool:
@@ -202,13 +207,6 @@ def _margins_of_seams(
     terminal.print("not judged: the moves between the seams", markup=False, soft_wrap=True)
 
 
-def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
-    """Return what a process allows, both numbers or none."""
-    if (tolerance is None) != (turn is None):
-        raise sm.errors.ProblemError("--tolerance and --turn say together what the process allows")
-    return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
-
-
 def margins_json(margins: sm.margins.Margins) -> dict[str, Any]:
     """Return margins as JSON-safe values, the sentence first."""
     return {"sentence": margins.sentence, **_plain(dataclasses.asdict(margins))}
@@ -231,23 +229,22 @@ def _plain(value: Any) -> Any:
     rich_help_panel=PLAN,
 )
 def plan_margin(
-    file: Annotated[Path, typer.Argument(help="A problem file.")],
+    file: options.DocumentArgument,
     position: Annotated[float, typer.Option(help="By how much it may be shifted (m).")] = 0.0,
     rotation: Annotated[float, typer.Option(help="By how much it may be turned (rad).")] = 0.0,
-    of: Annotated[
-        list[str] | None, typer.Option(help="part (the default), tool or base. Repeatable.")
-    ] = None,
-    part: Annotated[
-        list[str] | None,
-        typer.Option(help="A body of the part (repeatable); by default all obstacles there."),
-    ] = None,
+    of: options.OfOption = None,
+    part: options.PartOption = None,
     out: options.OutOption = None,
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
-    """Plan a motion that tolerates displacements of part, tool or base."""
+    """Plan a motion that tolerates displacements of part, tool or base.
+
+    Of a problem file, or of the problem of a plan (.npz).
+    """
     outputs.check_suffixes(out or [])
-    problem = documents.of_file(file, settings or [], allow_code).problem
+    problem = documents.problem_of(file, documents.Said(settings), allow_code)
     with StageDisplay(stages) as display:
         planned = sm.plan_with_margin(
             problem,
@@ -256,6 +253,9 @@ def plan_margin(
             part=part or None,
             progress=display.stage,
         )
-    terminal.print(str(planned), markup=False, soft_wrap=True)
-    outputs.write(planned.plan, out or [], None, terminal, quiet=False)
+    if as_json:
+        print_json(summaries.plan_json(planned.plan) | {"reached": planned.reached})
+    else:
+        terminal.print(str(planned), markup=False, soft_wrap=True)
+    outputs.write(planned.plan, out or [], None, terminal, quiet=as_json)
     raise typer.Exit(VERIFIED if planned.reached else NOT_VERIFIED)

@@ -1,9 +1,7 @@
-"""Options of the commands, and what their texts mean."""
+"""Options of the commands, each declared once, and what their texts mean."""
 
-import inspect
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import fields, replace
-from functools import wraps
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,24 +9,44 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion import basics
 from selfmotion.basics import TURN, Array
-from selfmotion.shell import documents
+from selfmotion.shell.documents import json_schema, keys_of
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
-Corners = Literal["blend", "stop", "round"]
-Rotary = Literal["head", "table"]
-DrawnUnit = Literal["mm", "cm", "dm", "m", "in", "ft"]
-Axis = Literal["x", "y", "z"]
-SearchMode = Literal["auto", "local", "global"]
+_SEVERAL = "may be given several times"
+
+# What commands are about.
 
 ProblemArgument = Annotated[
     str,
     typer.Argument(
-        help="A problem file (.toml, .json; see `selfmotion init`), or a robot: name (see "
-        "`selfmotion robots`), .urdf or .xacro file."
+        help="A robot: name (see `selfmotion robots`), .urdf or .xacro file; to plan, also a "
+        "problem file (.toml, .json; see `selfmotion init`)."
     ),
 ]
+DocumentArgument = Annotated[
+    Path,
+    typer.Argument(
+        help="A problem file or a job file (.toml, .json); to show, also a plan (.npz) or .program."
+    ),
+]
+DocumentsArgument = Annotated[
+    list[Path],
+    typer.Argument(help=r"Problem files (of a \[grid] all combinations), or a job file."),
+]
+PlanArgument = Annotated[
+    Path,
+    typer.Argument(
+        help="A plan saved as .npz, a .program, .parts, or, to check, a motion: .csv (t, a column "
+        "per joint), .json, .yaml (ROS), .mcap (ROS bag), .src (KUKA), .mod (ABB), .script (linear "
+        "URScript)."
+    ),
+]
+PlansArgument = Annotated[
+    list[Path], typer.Argument(help="Plans saved as .npz, or one or more .program.")
+]
+
+# What is planned: short forms of keys, and all keys.
 
 PathOption = Annotated[
     Path | None,
@@ -36,250 +54,134 @@ PathOption = Annotated[
         help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or roll,pitch,yaw (about fixed axes) or "
         "rx,ry,rz (rotation vector) or nx,ny,nz (s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path "
         "and PoseArray as .yaml and .json; G-code (.nc, .gcode, …), APT (.apt, .cls, …), or a "
-        "drawing (.dxf)."
-    ),
-]
-_FROM = "from the tool's pose at --start (by default a dexterous configuration)"
-CircleOption = Annotated[
-    float | None, typer.Option(help=f"Or a circle of this radius (m), {_FROM}.")
-]
-LineOption = Annotated[
-    str | None, typer.Option(help=f"Or a straight line by dx,dy,dz (m), {_FROM}.")
-]
-NormalOption = Annotated[
-    Axis | None,
-    typer.Option(help="Axis of the circle; x by default, of a planar arm that of its plane."),
-]
-DurationOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Of circle or line (s; 4 by default without --feed), or of poses without times."
+        "drawing (.dxf). How it is read: --set path.KEY=VALUE."
     ),
 ]
 FeedOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Constant tool speed from rest to rest (m/s), of circle or line, or of poses without "
-        "times."
-    ),
-]
-JumpOption = Annotated[
-    float | None,
-    typer.Option(help="Largest distance between poses of --path (m; 0.5 by default)."),
-]
-SeamOption = Annotated[
-    str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
-]
-ColumnsOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Names of the columns of --path, an array or without a header: x,y,z,nx,ny,nz."
-    ),
-]
-FlipOption = Annotated[
-    bool,
-    typer.Option("--flip-normals", help="Normals of --path point out of the part, as CAD's do."),
-]
-StandoffOption = Annotated[
-    float | None,
-    typer.Option(help="Distance from the poses of --path, back along the tool's z axis (m)."),
-]
-AlongOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Which axis of the tool is along --path: x, -x, y or -y; with --corners stop or round."
-    ),
-]
-LeadOption = Annotated[
-    float | None,
-    typer.Option(help="By how much the tool leans towards where it goes, with --along (rad)."),
-]
-TiltOption = Annotated[
-    float | None,
-    typer.Option(help="By how much it leans to the left of where it goes, with --along (rad)."),
-]
-LiftOption = Annotated[
-    float | None,
-    typer.Option(
-        help="How far the tool leaves corners to turn, with --along and --corners stop (m)."
-    ),
-]
-RotaryOption = Annotated[
-    Rotary | None,
-    typer.Option(
-        help="What A, B, C of G-code without G43.4 turn: the head (positions are the tip's), or a "
-        "table, with its axes and centre."
-    ),
-]
-RotaryAxesOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Axes of a rotary table from the machine to the part: BC, AC, or B,-C where C turns "
-        "the table right-handed; with --rotary head under tool centre point control."
-    ),
-]
-RotaryCenterOption = Annotated[
-    str | None, typer.Option(help="A point x,y,z (m) on the axes of a rotary table.")
-]
-UnitOption = Annotated[
-    DrawnUnit | None,
-    typer.Option(help="Unit of a drawing (.dxf) that states none, or a wrong one."),
+    float | None, typer.Option(help="Constant tool speed from rest to rest (m/s): path.feed.")
 ]
 FrameOption = Annotated[
     str | None,
-    typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
-]
-RampOption = Annotated[
-    float | None,
-    typer.Option(help="Duration of run-up from rest and of run-down of --path (s)."),
-]
-CornersOption = Annotated[
-    Corners | None,
     typer.Option(
-        help="At corners of --path: blend through the pose (the default), stop there, or, "
-        "with --feed, round the corner between straight legs."
+        help="Pose of the frame that the path is in: x,y,z,roll,pitch,yaw (m, rad): path.frame."
     ),
 ]
-CornerToleranceOption = Annotated[
-    float | None,
-    typer.Option(help="Largest deviation at rounded corners (m; 0.001 by default).", min=1e-6),
-]
-_TASK = (
-    "Task: what the path prescribes, the pose of the tool, its position, or pointing: all but its "
-    "rotation about its own z axis; planar and planar_pose are for planar arms"
-)
-TaskOption = Annotated[TaskName, typer.Option(help=f"{_TASK}.")]
-CheckedTaskOption = Annotated[TaskName | None, typer.Option(help=f"{_TASK}; pose by default.")]
-PlannedTaskOption = Annotated[
+TaskOption = Annotated[
     TaskName | None,
-    typer.Option(help=f"{_TASK}; pose by default, planar for a planar arm."),
-]
-RelaxOption = Annotated[
-    list[str] | None,
     typer.Option(
-        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO]; ROWS are x,y,z, or rotations "
-        "rx,ry,rz about the tool's axes, BAND in m or rad (free without), times in s. "
-        "Examples: z=0.002, rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
+        help="What the path prescribes, the pose of the tool, its position, or pointing: all but "
+        "its rotation about its own z axis; planar and planar_pose are for planar arms. By default "
+        "pose, of a planar arm planar."
     ),
 ]
 StartOption = Annotated[
     str | None,
     typer.Option(
         help="q1,q2,… (rad or m), home, dexterous (far from limits and singular poses) or free "
-        "(the best that is found); by default free with --path, dexterous otherwise."
+        "(the best that is found); by default free, and dexterous where a shape begins there."
+    ),
+]
+ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link): robot.tool.")]
+
+
+@cache
+def _known_keys() -> tuple[str, ...]:
+    return keys_of(json_schema())
+
+
+def _complete(incomplete: str) -> list[str]:
+    """Return the keys of problem and job files that begin so, for the shell."""
+    return [f"{key}=" for key in _known_keys() if key.startswith(incomplete)]
+
+
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        autocompletion=_complete,
+        help='A key of the file, such as path.duration=6, \'path={kind="circle", radius=0.1, '
+        "duration=4}', constraints.ClosedPath=true, costs.InverseManipulability.mu=0.01 or "
+        "clearance.obstacles=@boxes.json (what a file says). Repeatable.",
     ),
 ]
 FromOption = Annotated[
     Path | None,
     typer.Option(
-        "--from", help="Warm start: begin with the start and the self-motion of this plan (.npz)."
+        "--from",
+        help="Begin with what was planned before: of a plan (.npz) the start and the self-motion; "
+        "of a .program what did not change is kept.",
     ),
 ]
-ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
-ReferenceOption = Annotated[
-    str | None,
-    typer.Option(help="Link in whose frame the path is given, where it moves: a part on a table."),
-]
-DegreeOption = Annotated[
-    int | None,
+DeadlineOption = Annotated[
+    float | None,
     typer.Option(
-        help="The published method: the self-motion ε(t) is a polynomial of this degree, and no "
-        "constraint is kept but closure. By default ε(t) is any function."
-    ),
-]
-MuOption = Annotated[
-    float,
-    typer.Option(
-        help="Weight of the cost 1/det(JJᵀ), which keeps away from singular configurations."
-    ),
-]
-CostOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="NAME[=WEIGHT], such as JointAcceleration=0.1. Repeatable; replaces the "
-        "default, JointVelocity."
-    ),
-]
-ClosedOption = Annotated[
-    bool, typer.Option("--closed", help="End in the configuration and velocity of the start.")
-]
-NoCollisionOption = Annotated[
-    bool, typer.Option("--no-self-collision", help="Do not check self-collision.")
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", help="KEY=VALUE of the problem file, such as path.duration=6. Repeatable."
+        help="Stop after this many seconds by the clock, with the best so far; of many problems, "
+        "each."
     ),
 ]
 AllowCodeOption = Annotated[
     bool, typer.Option("--allow-code", help="Import what the file names as module:attribute.")
 ]
-DampedOption = Annotated[
-    bool,
-    typer.Option(
-        "--damped", help="Damp the inverse near singular poses; there the tool may leave its path."
-    ),
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes.")]
+DaskOption = Annotated[
+    str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
 ]
-DeadlineOption = Annotated[
-    float | None,
-    typer.Option(help="Stop after this many seconds by the clock, with the best so far."),
-]
-LimitOption = Annotated[
-    int | None, typer.Option(help="Limit on cost evaluations while optimising.")
-]
-SearchOption = Annotated[
-    SearchMode | None,
-    typer.Option(
-        help="Without --start: optimise from many starts (local), search all self-motions (global),"
-        " or global where local fails (auto, the default)."
-    ),
-]
-CompareOption = Annotated[
-    bool,
-    typer.Option(
-        "--compare",
-        help="Also run the global search, and report the distance from its best motion.",
-    ),
-]
+
+# What is written and printed.
+
 OutOption = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .mcap, "
-        ".xml, .script, .src, .mod; see `selfmotion export`). Repeatable."
+        help="File to write: a plan (.npz), a .program or .parts, a problem file, a replay "
+        "(.html), or the motion (.csv, .json and .yaml (ROS 2 JointTrajectory), .mcap (ROS 2 bag), "
+        ".xml (MuJoCo keyframes), .script (URScript), .src (KUKA), .mod (ABB)). Repeatable."
     ),
+]
+OneOutOption = Annotated[
+    Path | None, typer.Option("--out", "-o", help="The file, or the folder, to write.")
+]
+FolderOption = Annotated[
+    Path | None,
+    typer.Option("--folder", help="Folder for what is made; what was stopped goes on there."),
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]
-
-CheckedArgument = Annotated[
-    Path,
-    typer.Argument(
-        help="A plan saved as .npz, a .program, .parts, or a motion: .csv (t, a column per joint), "
-        ".json, .yaml (ROS), .mcap (ROS bag), .src (KUKA), .mod (ABB), .script (linear URScript)."
+MapOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--map",
+        help="Draw a map as .png: a plan's redundancy (.npz has all of it), or places around the "
+        "best (.html as well). Repeatable.",
     ),
 ]
+ForceOption = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="Write what is refused otherwise: over a file, outside of a document's own folder, a "
+        "motion that is not verified or moves at an end.",
+    ),
+]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Print all that was measured, tried and found.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
+SettingsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with settings of a controller's program: deviation, axes, signals, "
+        "flange, mass, center, approach, targets, work_object, positioner (TOML)."
+    ),
+]
+
+# What motions are judged by, and made faster.
+
 RobotOption = Annotated[
     str | None,
     typer.Option(
-        help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
-        ".json) or the plan that it comes from (.npz), with everything these ask for; for the "
-        ".src, .mod or .script of a job its .program."
-    ),
-]
-LockOption = Annotated[
-    list[str] | None,
-    typer.Option(help="Joint to lock: NAME=VALUE (rad or m). Repeatable."),
-]
-ArgumentOption = Annotated[
-    list[str] | None,
-    typer.Option(help="Argument of a .xacro file: NAME=VALUE. Repeatable."),
-]
-PackagesOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        help="Folder with packages that a robot's file names (package://, $(find …)); by default "
-        "they are looked for around the file, and by AMENT_PREFIX_PATH and ROS_PACKAGE_PATH. "
-        "Repeatable."
+        help="What a motion is of: name (`selfmotion robots`), .urdf file, or a problem file "
+        "(.toml, .json) or the plan that it comes from (.npz), with everything these ask for; of "
+        "the .src, .mod or .script of a job its .program."
     ),
 ]
 CalibrationOption = Annotated[
@@ -292,122 +194,43 @@ CalibrationOption = Annotated[
 DegreesOption = Annotated[
     bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
 ]
+ToleranceOption = Annotated[
+    float | None, typer.Option(help="Allowed deviation of the tool from its path (m).")
+]
+TurnOption = Annotated[
+    float | None, typer.Option(help="Allowed deviation of its orientation (rad).")
+]
 VelocityOption = Annotated[
     str | None, typer.Option(help="Velocity limits (rad/s or m/s): one, or one per joint.")
 ]
 AccelerationOption = Annotated[
     str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²): one, or one per joint.")
 ]
-JointLimitsOption = Annotated[
-    Path | None,
-    typer.Option(help="Limits of joints in MoveIt's joint_limits.yaml, besides the arm's own."),
-]
-ObstaclesOption = Annotated[
-    Path | None,
-    typer.Option(help=r"Obstacles: a list of shapes in JSON, or TOML with \[\[obstacles]]."),
-]
-ClearanceOption = Annotated[
-    float,
-    typer.Option(
-        help="Distance to keep from obstacles and of links from each other (m); at 0 they may not "
-        "overlap."
-    ),
-]
-SrdfOption = Annotated[
-    Path | None, typer.Option(help="SRDF: its disabled pairs of links are not checked.")
-]
-DisabledOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="LINK,LINK",
-        help="Two links that may overlap, as they are made so. Repeatable.",
-    ),
-]
-ToleranceOption = Annotated[
+RateOption = Annotated[
     float | None,
     typer.Option(
-        help="Allowed deviation from the path (m and rad); 1e-6 by default, or the plan's."
+        help="Samples per second that a controller takes: limits are kept between these. By "
+        "default the plan's own, few, joined by quintics."
     ),
 ]
-ForceOption = Annotated[
-    bool,
-    typer.Option("--force", help="Write outputs that the file names outside of its own folder."),
+
+# What moves, where cells are measured and placed.
+
+PartOption = Annotated[
+    list[str] | None,
+    typer.Option(help=f"A body of the part ({_SEVERAL}); by default all obstacles there."),
 ]
-VerboseOption = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Print all that was measured, tried and found.")
+OfOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="What is moved: part (the default), tool or base; to place, part, base, or path for "
+        "the path alone."
+    ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
-
-
-def of_table(
-    table: type[Any], after: str, names: Collection[str] = ()
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that gives a command the fields of a dataclass as options.
-
-    The command reads them from its context.
-
-    Parameters
-    ----------
-    table : type
-        A dataclass whose types are options.
-    after : str
-        The parameter of the command after which they are listed.
-    names : collection of str
-        Which of the fields; by default all.
-    """
-    added = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.POSITIONAL_OR_KEYWORD,
-            default=field.default,
-            annotation=field.type,
-        )
-        for field in fields(table)
-        if not names or field.name in names
-    ]
-
-    def with_options(command: Callable[..., None]) -> Callable[..., None]:
-        own = inspect.signature(command).parameters
-        place = list(own).index(after) + 1
-
-        @wraps(command)
-        def run(**given: Any) -> None:
-            command(**{name: given[name] for name in own})
-
-        parameters = [*own.values()]
-        parameters[place:place] = added
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        return run
-
-    return with_options
-
-
-def relaxation(text: str) -> sm.Relaxation:
-    """Return what --relax describes."""
-    rest, _, window = text.partition("@")
-    rows, _, band = rest.partition("=")
-    try:
-        first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
-        item = sm.Relaxation(
-            tuple(rows.split(",")),
-            float(band) if band else np.inf,
-            (first, last) if window else None,
-        )
-    except ValueError:
-        raise sm.errors.ProblemError(
-            f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
-        ) from None
-    return item
-
-
-def search_of(
-    mode: SearchMode | None, compare: bool, known: sm.Search | None = None
-) -> sm.Search | None:
-    """Return how to search where the user says something about it, else as is `known`."""
-    if mode is None and not compare:
-        return None
-    search = known or sm.Search()
-    return replace(search, mode=mode or search.mode, compare=compare or search.compare)
+CenterOption = Annotated[
+    str | None,
+    typer.Option(help="Centre of rotation of the part: x,y,z (m); by default the path's middle."),
+]
 
 
 def numbers(text: str, option: str, count: int | None = None) -> Array:
@@ -423,33 +246,20 @@ def numbers(text: str, option: str, count: int | None = None) -> Array:
     return numbers
 
 
-def locks(texts: list[str] | None) -> dict[str, float]:
-    """Return what --lock describes."""
-    held = {}
-    refuse_twice("--lock", [text.partition("=")[0] for text in texts or []])
-    for text in texts or []:
-        name, _, value = text.partition("=")
-        try:
-            held[name] = float(value)
-        except ValueError:
-            raise sm.errors.RobotError(
-                f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
-            ) from None
-    return held
-
-
-def arguments(texts: list[str] | None) -> dict[str, str]:
-    """Return what --argument describes."""
-    values = {}
-    refuse_twice("--argument", [text.partition("=")[0] for text in texts or []])
-    for text in texts or []:
-        name, mark, value = text.partition("=")
-        if not (name and mark):
-            raise sm.errors.RobotError(
-                f"--argument is '{text}', expected NAME=VALUE like prefix=left_"
+def ranges(texts: list[str] | None) -> dict[str, Array]:
+    """Return the ranges of --within, by coordinate."""
+    pairs = [text.partition("=") for text in texts or []]
+    refuse_twice("--within", [name for name, _, _ in pairs])
+    for name, _, low in pairs:
+        if name not in _COORDINATES:
+            raise sm.errors.ProblemError(
+                f"--within is '{name}={low}', expected COORDINATE=LOW,HIGH like x=-0.2,0.2, one of "
+                f"{', '.join(_COORDINATES)}"
             )
-        values[name] = value
-    return values
+    return {name: numbers(values, f"--within {name}", 2) for name, _, values in pairs}
+
+
+_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 def refuse_twice(option: str, names: list[str]) -> None:
@@ -459,25 +269,33 @@ def refuse_twice(option: str, names: list[str]) -> None:
         raise sm.errors.ProblemError(f"{option} says '{twice}' twice; say it once")
 
 
-def refuse(options: dict[str, Any], file: Path | str, whose: str) -> None:
+def refuse(options: Mapping[str, Any], file: Path | str, whose: str) -> None:
     """Raise ProblemError for an option that what is checked says itself."""
     for name, value in options.items():
-        if value is not None:
+        if value:
             raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
-def refuse_unused(options: dict[str, Any], what: str) -> None:
+def refuse_unused(options: Mapping[str, Any], what: str) -> None:
     """Raise ProblemError for an option that has no effect on what is planned."""
     for name, value in options.items():
         if value is not None:
-            option = name.replace("_", "-")
-            raise sm.errors.ProblemError(f"--{option} has no effect on {what}: leave it out")
+            raise sm.errors.ProblemError(f"--{name} has no effect on {what}: leave it out")
 
 
-def one_or_each(text: str, option: str) -> list[float] | float:
-    """Return one number, or one for each joint."""
+def one_or_each(text: str | None, option: str) -> list[float] | float | None:
+    """Return one number, or one for each joint; None where nothing is said."""
+    if text is None:
+        return None
     values: list[float] = numbers(text, option).tolist()
     return values[0] if len(values) == 1 else values
+
+
+def process_tolerance(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
+    """Return what a process allows, both numbers or none."""
+    if (tolerance is None) != (turn is None):
+        raise sm.errors.ProblemError("--tolerance and --turn say together what the process allows")
+    return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
 
 
 def pose(text: str, option: str) -> dict[str, Any]:
@@ -490,45 +308,3 @@ def pose(text: str, option: str) -> dict[str, Any]:
                 f"x,y,z,roll,pitch,yaw in m and rad: 90° is 1.5708"
             )
     return {"position": values[:3], "rpy": values[3:]}
-
-
-def read_obstacles(file: Path) -> tuple[sm.obstacles.Obstacle, ...]:
-    """Return the obstacles of a file; see `obstacle_tables`."""
-    obstacles = []
-    for k, item in enumerate(obstacle_tables(file)):
-        try:
-            obstacles.append(documents.obstacle(item, lambda name: Path(name)))
-        except sm.SelfmotionError as error:
-            raise sm.errors.FileFormatError(f"{file}: [{k}]: {error}") from error
-    return tuple(obstacles)
-
-
-def obstacle_tables(file: Path) -> list[dict[str, Any]]:
-    """Return the tables of a JSON list of obstacles, or of ``[[obstacles]]`` in TOML or JSON.
-
-    Mesh files are looked for beside the file.
-    """
-    listed = _listed(file)
-    if not (isinstance(listed, list) and all(isinstance(item, dict) for item in listed)):
-        raise sm.errors.FileFormatError(
-            f"{file}: expected a list of obstacles, each a table of values"
-        )
-    tables = [basics.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
-    for item in tables:
-        if isinstance(item.get("file"), str):
-            item["file"] = str(file.parent / item["file"])
-    return tables
-
-
-def _listed(file: Path) -> Any:
-    content = basics.read_values(file)
-    return content.get("obstacles") if isinstance(content, dict) else content
-
-
-def disabled_pairs(texts: Sequence[str] | None) -> list[list[str]]:
-    """Return the pairs of links of --disabled."""
-    pairs = [[name.strip() for name in text.split(",")] for text in texts or ()]
-    for text, pair in zip(texts or (), pairs, strict=True):
-        if len(pair) != 2 or not all(pair):
-            raise sm.errors.ProblemError(f"--disabled is {text!r}, expected two links: LINK,LINK")
-    return pairs

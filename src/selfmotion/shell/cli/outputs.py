@@ -1,72 +1,34 @@
-"""The files that a plan is written to, and the options of what programs say."""
+"""The files that a plan is written to, and the settings of what programs say."""
 
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import NoReturn
 
-import numpy as np
 import typer
 from rich.console import Console
 
 import selfmotion as sm
+from selfmotion import basics
 from selfmotion.certificate import Extreme
-from selfmotion.model.task import SE3, exp3
+from selfmotion.model.task import SE3
 from selfmotion.shell.cli import reread, summaries, tables
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
+from selfmotion.shell.cli.documents import Said
 from selfmotion.shop import controllers
 
-# Options of commands that write programs of controllers.
-
-SettingsOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="File with settings of a controller's program: deviation, axes, signals, "
-        "flange, mass, center, approach, targets, work_object, positioner (TOML)."
-    ),
-]
-TargetsOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Of controllers' programs: joints; poses (linear and circular motions in a work "
-        "object at the feed, which can be shifted and touched up); timed-poses (at the plan's "
-        "times)."
-    ),
-]
-WorkObjectOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Work object of the poses: path (the frame that the path is given in), a link, or "
-        "x,y,z,rx,ry,rz \\[m, and rotation vector in rad] in the controller's frame: the link "
-        "base where there is one, of Universal Robots' arms turned by 180 degrees from that of "
-        "--frame; with --targets poses.",
-        metavar="path|NAME|X,Y,Z,RX,RY,RZ",
-    ),
-]
-MassOption = Annotated[
-    float | None,
-    typer.Option(help="Of controllers' programs: mass of what the flange carries \\[kg]."),
-]
+# Settings of controllers' programs.
 
 
 def program_settings(
-    file: Path | None, targets: str | None, wobj: str | None, mass: float | None
+    file: Path | None, settings: Sequence[str] | None = None
 ) -> sm.files.ProgramSettings | None:
-    """Return the settings of controllers' programs: those of a file, and of options; None for none.
-
-    Raises
-    ------
-    ProblemError
-        A work object is neither a name nor six numbers.
-    """
-    given: dict[str, Any] = {} if targets is None else {"targets": targets}
-    if mass is not None:
-        given["mass"] = mass
-    if wobj is not None:
-        given["work_object"] = _work_object(wobj)
-    if file is not None:
-        return sm.files.read_program_settings(file, **given)
-    return sm.files.ProgramSettings(**given) if given else None
+    """Return the settings of controllers' programs, of a file and set; None for none."""
+    if file is None and not settings:
+        return None
+    document = {} if file is None else basics.read_document(file)
+    Said(settings).set_in(document, Path() if file is None else file.parent)
+    return controllers.program_settings_of(document, "--set" if file is None else str(file))
 
 
 def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
@@ -74,30 +36,6 @@ def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> 
     told = controllers.turned_base(robot)
     if told and asked is not None and isinstance(asked.work_object, SE3):
         stages.print(f"note: {told}", markup=False, soft_wrap=True)
-
-
-def _work_object(text: str) -> str | SE3:
-    """Return the link or the pose that an option says."""
-    parts = text.split(",")
-    if len(parts) == 1:
-        return text
-    try:
-        values = [float(part) for part in parts]
-    except ValueError:
-        values = []
-    if len(values) != 6 or not np.isfinite(values).all():
-        raise sm.errors.ProblemError(
-            f"--wobj: '{text}' is neither the name of a link nor six numbers x,y,z,rx,ry,rz "
-            f"[m, rad]"
-        )
-    turn = float(np.linalg.norm(values[3:]))
-    if turn > np.pi * (1.0 + 1e-4):
-        raise sm.errors.ProblemError(
-            f"--wobj has a rotation vector of {turn:.4g} rad, more than half a turn; in degrees, "
-            f"or angles about axes? Expected x,y,z,rx,ry,rz in m, and the axis of one turn as long "
-            f"as its angle in rad: 0,0,1.5708 is 90° about z"
-        )
-    return SE3(exp3(np.array(values[3:])), np.array(values[:3]))
 
 
 # The files that a plan is written to.

@@ -10,13 +10,19 @@ import typer
 
 import selfmotion as sm
 from selfmotion.basics import write_document
-from selfmotion.shell.cli import documents, options
-from selfmotion.shell.cli.app import PLAN, StageDisplay, app, stages, terminal
+from selfmotion.shell.cli import documents, options, summaries
+from selfmotion.shell.cli.app import (
+    PLAN,
+    StageDisplay,
+    app,
+    print_json,
+    print_written,
+    stages,
+    terminal,
+)
 from selfmotion.shell.documents import SeamJob, belonging, moved_workpiece
 from selfmotion.work.batch import processes
 
-_Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
-_Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
 # Suffixes of problem files.
 _PROBLEM_SUFFIXES = (".toml", ".json")
 # Suffixes of pages and pictures.
@@ -24,83 +30,83 @@ _PAGE_SUFFIXES = (".html", ".png")
 
 
 @app.command(
-    epilog="Example: selfmotion place cell.toml --x=-0.2,0.2 --yaw=-0.5,0.5 --part block --out "
-    "placed.toml --map map.html",
+    epilog="Example: selfmotion place cell.toml --within x=-0.2,0.2 --within yaw=-0.5,0.5 --part "
+    "block --out placed.toml --map map.html",
     rich_help_panel=PLAN,
 )
 def place(
-    files: Annotated[list[Path], typer.Argument(help="Problem files, of one arm.")],
-    x: _Range = None,
-    y: _Range = None,
-    z: _Range = None,
-    roll: _Turns = None,
-    pitch: _Turns = None,
-    yaw: _Turns = None,
-    base: Annotated[
-        bool, typer.Option("--base", help="Move the arm's base, not the part.")
-    ] = False,
-    part: Annotated[
+    files: options.DocumentsArgument,
+    within: Annotated[
         list[str] | None,
-        typer.Option(help="An obstacle that belongs to the part (may be given several times)."),
-    ] = None,
-    path_alone: Annotated[
-        bool, typer.Option("--path-alone", help="No obstacle moves along with the path.")
-    ] = False,
-    center: Annotated[
-        str | None,
-        typer.Option(help="Centre of rotation: x,y,z (m); by default the middle of the paths."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes; by default this one alone.", min=1)
-    ] = None,
-    deadline: options.DeadlineOption = None,
-    out: Annotated[
-        list[Path] | None,
         typer.Option(
-            help="Problem file (.toml, .json) or plan (.npz) at the place; of several problems "
-            "numbered. Repeatable."
+            metavar="COORDINATE=LOW,HIGH",
+            help="Range of x, y, z (m), roll, pitch or yaw (rad), as x=-0.2,0.2. Repeatable.",
         ),
     ] = None,
-    drawn: Annotated[
-        list[Path] | None,
-        typer.Option("--map", help="Map of places around it, as .html or .png. Repeatable."),
-    ] = None,
+    of: options.OfOption = None,
+    part: options.PartOption = None,
+    center: options.CenterOption = None,
+    workers: options.WorkersOption = None,
+    deadline: options.DeadlineOption = None,
+    out: options.OutOption = None,
+    drawn: options.MapOption = None,
     points: Annotated[int, typer.Option(help="Points of the map in each direction.", min=2)] = 9,
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Find the place of the part, or of the arm, at which the motions cost least.
 
+    Of problem files of one arm, or of the problems of plans (.npz). Problem files (.toml, .json)
+    and plans (.npz) are written as --out, of several problems numbered.
     Of a job all seams are placed together, and a job file is written. What stands in the frame of
     a file's workpiece belongs to the part.
     """
-    request = _Asked(tuple(files), tuple(out or ()), base, part, path_alone, tuple(settings or ()))
+    moved = _moved(of or ["part"])
+    request = _Asked(
+        tuple(files),
+        tuple(out or ()),
+        moved == "base",
+        part,
+        moved == "path",
+        documents.Said(settings),
+    )
     request.check(drawn or [])
     read = request.documents()
     job = request.job(read, allow_code)
     problems = request.problems(allow_code) if job is None else list(job.problems)
-    within = _within({"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw})
+    bounds = options.ranges(within)
     move_options = request.moving(read, center)
     if job is not None and out:
         _check_moved_bodies(files[0], read[0], job, move_options.get("part", ()))
-    placement = _placed(workers, problems, within, deadline=deadline, **move_options)
-    terminal.print(str(placement), markup=False, soft_wrap=True)
+    placement = _placed(workers, problems, bounds, deadline=deadline, **move_options)
+    if not as_json:
+        terminal.print(str(placement), markup=False, soft_wrap=True)
+    written = list[Path]()
     for file in out or []:
         if job is None:
-            _write(placement, file)
+            written += _write(placement, file)
         else:
-            _write_job(placement, read[0], problems[0], file)
+            written.append(_write_job(placement, read[0], problems[0], file))
     if drawn:
-        _draw(placement, drawn, placement.map(points=points) if len(within) > 1 else None)
+        _draw(placement, drawn, placement.map(points=points) if len(bounds) > 1 else None)
+        written += drawn
+    if as_json:
+        print_json(summaries.placement_json(placement) | {"written": [*map(str, written)]})
+    else:
+        print_written(written)
 
 
-def _within(named: Mapping[str, str | None]) -> dict[str, Any]:
-    """Return the ranges that are given, by coordinate."""
-    return {
-        name: options.numbers(text, f"--{name}", 2)
-        for name, text in named.items()
-        if text is not None
-    }
+def _moved(of: Sequence[str]) -> str:
+    """Return the one thing that is moved."""
+    if len(of) != 1 or of[0] not in _MOVED:
+        raise sm.errors.ProblemError(
+            f"--of is {', '.join(of)}, expected one of {', '.join(_MOVED)}"
+        )
+    return of[0]
+
+
+_MOVED = ("part", "base", "path")
 
 
 def _placed(workers: int | None, *given: Any, **settings: Any) -> sm.placement.Placement:
@@ -121,7 +127,7 @@ class _Asked:
     files, out : tuple of Path
     base, path_alone : bool
     part : list of str or None
-    settings : tuple of str
+    said : Said
     """
 
     files: tuple[Path, ...]
@@ -129,13 +135,13 @@ class _Asked:
     base: bool
     part: list[str] | None
     path_alone: bool
-    settings: tuple[str, ...]
+    said: documents.Said
 
     def check(self, drawn: Sequence[Path]) -> None:
         """Raise where options contradict each other, or a file is of no known kind."""
         if self.part and self.path_alone:
             raise sm.errors.ProblemError(
-                "--part and --path-alone say different things; give one of them"
+                "--part and --of path say different things; give one of them"
             )
         for file in [*self.out, *drawn]:
             suffixes = (*_PROBLEM_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
@@ -146,7 +152,10 @@ class _Asked:
 
     def documents(self) -> list[Mapping[str, Any]]:
         """Return the documents of the files; an error where a job is one of several."""
-        read = [documents.document_of(file, list(self.settings)) for file in self.files]
+        read = [
+            {} if file.suffix == ".npz" else documents.document_of(file, self.said.settings)
+            for file in self.files
+        ]
         jobs = [file for file, found in zip(self.files, read, strict=True) if "seams" in found]
         if jobs and len(self.files) > 1:
             raise sm.errors.ProblemError(f"{jobs[0]}: is a job of many seams; give it alone")
@@ -156,14 +165,13 @@ class _Asked:
         """Return the job that the file describes, which can be written at its place, or None."""
         if "seams" not in read[0]:
             return None
-        job = documents.seams_of_file(self.files[0], list(self.settings), allow_code)
+        job = documents.seams_of_file(self.files[0], self.said.settings, allow_code)
         _check_placed_jobs(self.files[0], self.out, self.base)
         return job
 
     def problems(self, allow_code: bool) -> list[sm.Problem]:
         """Return the problems of the files."""
-        settings = list(self.settings)
-        return [documents.of_file(file, settings, allow_code).problem for file in self.files]
+        return [documents.problem_of(file, self.said, allow_code) for file in self.files]
 
     def moving(self, read: Sequence[Mapping[str, Any]], center: str | None) -> dict[str, Any]:
         """Return what moves, as `place` is told: the arm's base, or the part with its bodies."""
@@ -183,13 +191,13 @@ class _Asked:
 
 def _write_job(
     placement: sm.placement.Placement, document: Mapping[str, Any], problem: sm.Problem, file: Path
-) -> None:
+) -> Path:
     """Write the document of a job with its workpiece moved to the place."""
     # Paths are in the frame of the reference, which need not be the world.
     frame = problem.follows.items[0].chain.base_placement
     by = frame.inverse() * placement.displacement * frame
     write_document(file, moved_workpiece(document, by))
-    terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+    return file
 
 
 def _draw(placement: sm.placement.Placement, drawn: Sequence[Path], pictured: Any) -> None:
@@ -201,7 +209,6 @@ def _draw(placement: sm.placement.Placement, drawn: Sequence[Path], pictured: An
             raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
         else:
             pictured.figure().savefig(file)
-        terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
 def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
@@ -225,7 +232,7 @@ def _check_stands(file: Path, document: Mapping[str, Any]) -> None:
     if link is not None:
         raise sm.errors.ProblemError(
             f"{file}: the workpiece is on '{link}', and its bodies with it; a part is placed in "
-            f"the world: leave out workpiece.on, or give --base"
+            f"the world: leave out workpiece.on, or give --of base"
         )
 
 
@@ -251,13 +258,14 @@ def _check_moved_bodies(
         )
 
 
-def _write(placement: sm.placement.Placement, file: Path) -> None:
+def _write(placement: sm.placement.Placement, file: Path) -> list[Path]:
     """Write the problems or plans of a place, numbered where they are several."""
-    several = len(placement.plans) > 1
+    several, written = len(placement.plans) > 1, list[Path]()
     for number, plan in enumerate(placement.plans):
         named = file.with_stem(f"{file.stem}-{number}") if several else file
         if named.suffix == ".npz":
             plan.save(named)
         else:
             sm.files.write_problem(plan.problem, named)
-        terminal.print(f"wrote {named}", markup=False, soft_wrap=True)
+        written.append(named)
+    return written

@@ -13,7 +13,7 @@ import selfmotion as sm
 from selfmotion import basics, realtime
 from selfmotion.basics import ALL_WORKS, compile_in_background
 from selfmotion.realtime.warm import Compiled, small_works
-from selfmotion.shell.cli import options, outputs, summaries, tables
+from selfmotion.shell.cli import documents, options, outputs, summaries, tables
 from selfmotion.shell.cli.app import (
     BEGIN,
     FILES,
@@ -68,34 +68,26 @@ def panda_past_a_box() -> sm.Problem:
     epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch", rich_help_panel=PLAN
 )
 def batch(
-    files: Annotated[
-        list[Path], typer.Argument(help=r"Problem files; of a \[grid], all combinations.")
-    ],
-    out: Annotated[
-        Path, typer.Option(help="Folder for plans and tables; a run that was killed resumes there.")
-    ] = Path("out/batch"),
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; by default one for each core.")
-    ] = None,
-    dask: Annotated[
-        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
-    ] = None,
-    deadline: Annotated[
-        float | None, typer.Option(help="For each plan: stop after this many seconds by the clock.")
-    ] = None,
+    files: options.DocumentsArgument,
+    out: options.OneOutOption = Path("out/batch"),
+    workers: options.WorkersOption = None,
+    dask: options.DaskOption = None,
+    deadline: options.DeadlineOption = None,
     replays: Annotated[
         int, typer.Option(min=0, help="Write replays of so many of the best plans.")
     ] = 3,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Plan many problems into a folder, with a table ranked by cost.
+    """Plan many problems into a folder, with a table ranked by cost; what was killed resumes.
 
-    Exit code 0 if some combination of each file is verified.
+    By default there is a process for each core. Exit code 0 if some combination of each file is
+    verified.
     """
     from selfmotion.work.batch import plan_items
 
     check_cluster(dask, workers)
+    out = out or Path("out/batch")
     several = [_items_of(file, len(files) > 1, out, allow_code) for file in files]
     items = [item for each in several for item in each]
     names = [item.name for item in items]
@@ -158,9 +150,10 @@ def robots(as_json: options.JsonOption = False) -> None:
 
 @app.command(epilog="Example: selfmotion demo --out out", rich_help_panel=BEGIN)
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for plans and replays.")] = Path("out"),
+    out: options.OneOutOption = Path("out"),
 ) -> None:
     """Plan, check and replay the paper's planar arm, and a Panda that draws circles past a box."""
+    out = out or Path("out")
     problems = {"planar": sm.sample_problem(), "panda": panda_past_a_box()}
     verified = True
     for name, problem in problems.items():
@@ -177,28 +170,6 @@ def demo(
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion track --seconds 12 --out out/track", rich_help_panel=LOOP)
-def track(
-    task: options.TaskOption = "pose",
-    seconds: Annotated[float, typer.Option(help="Duration (s).", min=1.0, max=600.0)] = 12.0,
-    horizon: Annotated[float, typer.Option(help="Planning horizon (s).", min=0.1)] = 2.0,
-    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
-    out: Annotated[Path, typer.Option(help="Folder for replay and histogram.")] = Path("out/track"),
-) -> None:
-    """Plan while the arm moves: a simulated Panda keeps up with a conveyor.
-
-    It answers late, is measured with noise, and is pushed off its command at 3 s; at 6 s a ball
-    appears beside its elbow. Exit code 0 if all limits were kept.
-    """
-    from selfmotion.shell.cli import following
-
-    replanner, record, result = following.conveyor_run(task, seconds, seed, horizon)
-    kept = following.show_steps(replanner, record, following.least_distance(result), terminal)
-    for file in following.write(record, result, out):
-        terminal.print(f"wrote {file}", markup=False)
-    raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
-
-
 def _print_note(text: str) -> None:
     stages.print(text, markup=False, soft_wrap=True)
 
@@ -207,25 +178,11 @@ def _print_note(text: str) -> None:
     epilog="Example: selfmotion follow cell.toml --listen 127.0.0.1:5005", rich_help_panel=LOOP
 )
 def follow(
-    file: Annotated[Path, typer.Argument(help="A problem file: arm, path, costs, constraints.")],
+    file: options.DocumentArgument,
     listen: Annotated[
         str, typer.Option(help="host:port to wait for states at.")
     ] = "127.0.0.1:5005",
-    horizon: Annotated[float, typer.Option(help="Planning horizon (s).", min=0.1)] = 2.0,
-    period: Annotated[float, typer.Option(help="Time between states (s).", min=1e-3)] = 0.01,
-    cycle: Annotated[float, typer.Option(help="Time between set-points (s).", min=1e-4)] = 1e-3,
-    latency: Annotated[
-        float,
-        typer.Option(
-            help="Latency from measuring a state until the arm follows its segment (s).", min=0.0
-        ),
-    ] = 0.0,
-    silence: Annotated[
-        float, typer.Option(help="Time-out: stop if no state comes for so long (s).", min=0.1)
-    ] = 5.0,
-    seconds: Annotated[
-        float, typer.Option(help="Duration (s); by default until stopped.", min=0.1)
-    ] = float("inf"),
+    settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -233,16 +190,18 @@ def follow(
 
     A state is t, q, q̇ as doubles; the answer a row t, q, q̇, q̈ for each cycle, which ends at rest
     in case that the next one is late. The path begins with the first state; an empty datagram ends
-    it. Exit code 0 if every segment was planned.
+    it. The table loop of the file (or --set loop.period=0.01) has horizon, period, cycle, latency,
+    silence and seconds. Exit code 0 if every segment was planned.
     """
     from selfmotion.shell.cli import following
 
-    problem = sm.read_problem(file, allow_code=allow_code)
-    left = [key for key in basics.read_document(file) if key in _OF_PLANS]
+    document = documents.document_of(file, settings)
+    loop = following.loop_of(document, file)
+    problem = documents.of_file(file, documents.Said(settings), allow_code).problem
+    left = [key for key in document if key in _OF_PLANS]
     if left:
         _print_note(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")
-    asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}
-    replanner = following.replanner_of(problem, **asked)
+    replanner = following.replanner_of(problem, **loop.of_replanner)
     # The arm goes as far as it can; better to know before it moves.
     if beyond := following.out_of_reach(problem):
         _print_note(f"note: {beyond}")
@@ -250,9 +209,9 @@ def follow(
         # Nothing compiles once the arm moves.
         sm.warm_up(replanner)
         stages.print(f"waits for states at {listen}", markup=False)
-        link = following.Link(port, problem.path, replanner.limits, _print_note, silence, seconds)
+        link = following.Link(port, problem.path, replanner.limits, _print_note, loop)
         try:
-            realtime.follow(replanner, link.read, link.write, lead=latency)
+            realtime.follow(replanner, link.read, link.write, lead=loop.latency)
         except KeyboardInterrupt:
             link.ended = "stopped"
     if as_json:
@@ -264,7 +223,7 @@ def follow(
 
 @app.command(epilog="Example: selfmotion study --out out/study", rich_help_panel=BEGIN)
 def study(
-    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/study"),
+    out: options.OneOutOption = Path("out/study"),
     reduced: Annotated[
         bool, typer.Option("--reduced", help="Fewer starts, chains and arms: half a minute.")
     ] = False,
@@ -280,7 +239,7 @@ def study(
     scale = Scale.reduced() if reduced else Scale.full()
     with StageDisplay(stages) as display:
         result = run(scale, lambda part: display.stage(part, PARTS.index(part) + 1, len(PARTS)))
-    files = write(result, out)
+    files = write(result, out or Path("out/study"))
     tables.show_claims(result.claims, terminal)
     terminal.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
 

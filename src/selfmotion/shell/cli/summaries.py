@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -13,36 +13,43 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.result import Plan
+from selfmotion.shell.facts import Fact, facts_of_program, plan_facts, with_unit
 from selfmotion.work.job import Program
 
 if TYPE_CHECKING:
     from selfmotion.work.batch import Batch
+    from selfmotion.work.placement import Placement
 
 # Advice in messages of the library → the same with options of the shell.
 
 # As the library says it → as the shell does, in this order.
 _WORDS = (
     (r"take robot\.inverse_kinematics\(.*?\), task, seed=start\)", "give another --start"),
-    (r"\b(task|corners)='(\w+)'", r"--\1 \2"),
-    (r"\(?\brelaxations=\)?", "with --relax"),
-    (r"\b(tool|lock|start|acceleration|velocity|duration|feed)=(?=[\s;,.)]|$)", r"--\1"),
-    (r"give force=True to write it", "export --force writes it"),
-    (r"give a larger jump", "give a larger --jump"),
-    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or --duration (s)"),
+    (r"\btask='(\w+)'", r"--task \1"),
+    (r"\bcorners='(\w+)'", r"--set path.corners=\1"),
+    (r"\(?\brelaxations=\)?", "with relaxations (--set)"),
+    (r"\b(tool|start|feed)=(?=[\s;,.)]|$)", r"--\1"),
+    (r"\block=(?=[\s;,.)]|$)", "--set robot.lock.NAME=VALUE"),
+    (r"\bduration=(?=[\s;,.)]|$)", "--set path.duration=SECONDS"),
     (
-        r"so that (feed|duration) has no effect; drop one",
-        r"so that --\1 has no effect; drop it",
+        r"\b(acceleration|velocity)=(?=[\s;,.)]|$)",
+        lambda found: f"--set constraints.Joint{found[1].capitalize()}Limits.limit=NUMBER",
     ),
+    (r"give force=True to write it", "export --force writes it"),
+    (r"give a larger jump", "give a larger --set path.jump"),
+    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or path.duration (s)"),
+    (r"so that feed has no effect; drop one", "so that --feed has no effect; drop it"),
+    (r"so that duration has no effect; drop one", "so that path.duration has no effect; drop it"),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
     (r"\(Feed\.original\)", "(a duration in its place)"),
     (r"\(within=\)", "(--set path.within=0.5)"),
     (r"\((acceleration|turn_acceleration|turn_rate|within)=([0-9.e+]+)\)", r"(--set path.\1=\2)"),
-    (r"\bflip_normals\b", "--flip-normals"),
-    (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
-    (r"\brotary_(axes|center)\b", r"--rotary-\1"),
-    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--\1 "),
-    (r"raise max_evaluations", "raise --max-evaluations"),
-    (r"give columns \(", "give --columns ("),
+    (r"(?<!path\.)\bflip_normals\b", "--set path.flip_normals"),
+    (r"\b(rotary|unit) = '(\w+)'", r"--set path.\1=\2"),
+    (r"(?<!path\.)\brotary_(axes|center)\b", r"--set path.rotary_\1"),
+    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--set path.\1 "),
+    (r"raise max_evaluations", "raise --set max_evaluations"),
+    (r"give columns \(", "give --set path.columns ("),
     (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )
@@ -150,7 +157,7 @@ def show_certificate(
     _print(console, with_hint(in_shell(certificate.summary)), style)
     if approaches:
         name, nearest = min(approaches.items(), key=lambda item: item[1].value)
-        told = f"clearance {1e3 * nearest.value:.4g} mm at {nearest.time:.4g} s: {nearest.name}"
+        told = f"clearance {with_unit(nearest.value, 'm')} at {nearest.time:.4g} s: {nearest.name}"
         _print(console, told if name in nearest.name else f"{told} ({name})")
     count = len(certificate.remarks)
     if count:
@@ -183,8 +190,8 @@ def _help_of(message: str) -> str:
     if found:
         return found + told.partition("; ")[0]
     return (
-        "what may help: another --start; a --task that prescribes less; --relax; the path "
-        "in another place (selfmotion place)"
+        "what may help: another --start; a --task that prescribes less; relaxations (--set); the "
+        "path in another place (selfmotion place)"
     )
 
 
@@ -228,13 +235,19 @@ def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
     }
 
 
-def certificate_json(certificate: Certificate, approaches: Mapping[str, Extreme]) -> dict[str, Any]:
-    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come."""
+def certificate_json(
+    certificate: Certificate, approaches: Mapping[str, Extreme], facts: Sequence[Fact]
+) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come.
+
+    The facts are what tables show, in SI.
+    """
     return {
         "verified": certificate.verified,
         "verdict": certificate.verdict,
         **dataclasses.asdict(certificate),
         "approaches": {name: dataclasses.asdict(near) for name, near in approaches.items()},
+        "facts": [item.to_dict() for item in facts],
     }
 
 
@@ -260,7 +273,19 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         },
         "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
         "metres": dict(plan.metres),
-        "certificate": certificate_json(plan.certificate, plan.approaches),
+        "certificate": certificate_json(plan.certificate, plan.approaches, plan_facts(plan)),
+    }
+
+
+def placement_json(placement: "Placement") -> dict[str, Any]:
+    """Return the best place, as JSON-safe values."""
+    return {
+        "of": placement.of,
+        "place": dict(placement.place),
+        "cost": placement.cost,
+        "cost_before": placement.cost_before,
+        "on_bounds": list(placement.on_bounds),
+        "verdicts": [plan.certificate.verdict for plan in placement.plans],
     }
 
 
@@ -288,4 +313,5 @@ def program_json(program: Program) -> dict[str, Any]:
         "events": [
             {"time": time, "seam": seam, "event": event} for time, seam, event in program.events
         ],
+        "facts": [item.to_dict() for item in facts_of_program(program)],
     }

@@ -5,7 +5,6 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -13,11 +12,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
+from selfmotion.certificate import Certificate, Extreme
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Comparison, Gap, Plan, Report
 from selfmotion.shell.cli.summaries import in_shell, metres_text
+from selfmotion.shell.facts import Fact, certificate_facts, plan_facts, with_unit, without_repeats
 from selfmotion.work.job import Program
 
 if TYPE_CHECKING:
@@ -68,11 +68,7 @@ def show(plan: Plan, console: Console) -> None:
         console.print(_active_constraints(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
-    show_certificate(plan.certificate, plan.approaches, plan.robot, console)
-    if plan.limits_used.busy > _SELDOM:
-        told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
-        console.print(told, markup=False, soft_wrap=not console.is_terminal)
-    console.print(f"joint reversals: {plan.reversals}", markup=False)
+    _show_facts(plan_facts(plan), plan.certificate, console)
     if plan.metres:
         console.print(metres_text(plan), markup=False, soft_wrap=not console.is_terminal)
 
@@ -100,12 +96,6 @@ def _tried(report: Report) -> Table:
     return table
 
 
-# For less of the time than this it is not told which limits are used.
-_SELDOM = 0.1
-# How much of a limit is used.
-_SHARE = "{:.1%} of its limit"
-
-
 def show_certificate(
     certificate: Certificate,
     approaches: Mapping[str, Extreme],
@@ -113,41 +103,25 @@ def show_certificate(
     console: Console,
 ) -> None:
     """Print what forward kinematics found, how near each body comes, and the verdict."""
-    nearest = {certificate.limit_margin.name} & set(robot.joint_names)
-    title = f"checked at all times, with {certificate.samples} poses"
-    table = _table(title)
+    _show_facts(certificate_facts(certificate, approaches, robot), certificate, console)
+
+
+# Facts that are beside the table, or above it.
+_ELSEWHERE = ("plan", "search")
+
+
+def _show_facts(facts: Sequence[Fact], certificate: Certificate, console: Console) -> None:
+    """Print facts of a motion as a table, and the verdict."""
+    table = _table(f"checked at all times, with {certificate.samples} poses")
     table.add_column("worst")
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("at", justify="right", no_wrap=True)
     table.add_column("where", overflow="fold")
-    several = approaches if len(approaches) > 1 else {}
-    rows = (
-        ("position error", certificate.position_error, "{:.2e} m"),
-        ("rotation error", certificate.rotation_error, "{:.2e} rad"),
-        ("margin to joint limits", certificate.limit_margin, f"{{:.4g}} {robot.unit_of(*nearest)}"),
-        ("speed", certificate.velocity_ratio, _SHARE),
-        ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
-        ("acceleration", certificate.acceleration_ratio, _SHARE),
-        ("clearance", _in_mm(certificate.clearance), "{:.4g} mm"),
-        # Of one body alone the clearance says it.
-        *((f"closest to {name}", _in_mm(near), "{:.4g} mm") for name, near in several.items()),
-    )
-    for name, worst, form in rows:
-        if worst is None:
-            continue
-        value = form.format(worst.value)
-        table.add_row(escape(name), value, f"{worst.time:.3f} s", escape(worst.name))
-    shown = {"clearance", *LIMIT_NAMES}
-    for finding in certificate.findings:
-        if finding.requirement not in shown:
-            time = f"{finding.time:.3f} s"
-            table.add_row(*map(escape, _found(finding)), time, escape(finding.subject))
-    for worst in certificate.deviations:
-        unit = "rad" if "r" in worst.name else "m"
-        value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
-        table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
-    closure = f"{certificate.closure:.4g} {robot.unit_of()}"
-    table.add_row("joint distance, end to start", closure, "", "")
+    for fact in without_repeats(facts):
+        if fact.group not in _ELSEWHERE:
+            label = f"{fact.label} ({fact.limit})" if fact.limit else fact.label
+            where = ", ".join(part for part in (fact.where, fact.remark) if part)
+            table.add_row(*map(escape, (label, fact.number, fact.time, where)))
     console.print(table)
     for remark in certificate.remarks:
         console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)
@@ -157,21 +131,16 @@ def show_certificate(
     console.print(verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
 
 
-def _found(finding: Finding) -> tuple[str, str]:
-    """Return what was found, with what is allowed, and the value."""
-    name, allowed = finding.requirement, finding.allowed
-    if allowed == 1.0 and not finding.unit:
-        return name, _SHARE.format(finding.amount)
-    if name == "rest":
-        name = "acceleration at rest" if finding.unit.endswith("²") else "speed at rest"
-    above = finding.at_least or finding.satisfied == (finding.amount > allowed)
-    asked = f"at least {allowed:.4g}" if above else f"{allowed:.4g} allowed"
-    return f"{name} ({asked})", f"{finding.amount:.4g} {finding.unit}".strip()
-
-
-def _in_mm(near: Extreme | None) -> Extreme | None:
-    """Return a distance in millimetres."""
-    return None if near is None else replace(near, value=1e3 * near.value)
+def show_side_by_side(columns: Mapping[str, Sequence[Fact]], console: Console) -> None:
+    """Print a column of facts for each of several programs."""
+    table = _table("programs side by side")
+    for name in ("", *columns):
+        table.add_column(escape(name), overflow="fold")
+    known = [{item.label: item for item in facts} for facts in columns.values()]
+    for label in dict.fromkeys(label for each in known for label in each):
+        cells = (each[label].number if label in each else "" for each in known)
+        table.add_row(escape(label), *map(escape, cells))
+    console.print(table)
 
 
 def show_comparison(found: Comparison, console: Console) -> None:
@@ -204,8 +173,8 @@ def show_batch(batch: "Batch", console: Console) -> None:
         values = [escape(json.dumps(row.settings.get(key, ""))) for key in keys]
         outcome = ["-", "-", "-", "-"]
         if not row.error:
-            near = "-" if row.clearance is None else f"{1e3 * row.clearance:.4g} mm"
-            margin = "-" if row.margin is None else f"{row.margin:.4g} {row.margin_unit}"
+            near = "-" if row.clearance is None else with_unit(row.clearance, "m")
+            margin = "-" if row.margin is None else with_unit(row.margin, row.margin_unit)
             outcome = [row.outcome, f"{row.duration:.4g} s", margin, near]
         table.add_row(escape(row.name), *values, *outcome, row.reason or "yes")
     console.print(table)

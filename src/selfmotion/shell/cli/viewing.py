@@ -19,15 +19,9 @@ _SUFFIXES = (
 
 @app.command(epilog="Example: selfmotion view cell.toml", rich_help_panel=LOOK)
 def view(
-    file: Annotated[
-        Path,
-        typer.Argument(help="A problem or job file (.toml, .json), a plan (.npz), or a .program."),
-    ],
-    robot: Annotated[
-        Path | None,
-        typer.Option(help="Of a controller's program (.src, .mod …): the .program it was made of."),
-    ] = None,
-    settings: outputs.SettingsOption = None,
+    file: options.DocumentArgument,
+    robot: options.RobotOption = None,
+    settings: options.SettingsOption = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of this machine; 0 for a free one.")
     ] = 0,
@@ -53,9 +47,10 @@ def view(
             f".json, .yaml), a plan (.npz), a {jobs.PROGRAM} or {jobs.PARTS} file, or a program of "
             f"a controller with its {jobs.PROGRAM} as --robot"
         )
-    asked = None if settings is None else sm.files.read_program_settings(settings)
+    asked = outputs.program_settings(settings)
     with stages.status("planning …"):
-        session = pages.opened(file, allow_code=allow_code, job=robot)
+        job = None if robot is None else Path(robot)
+        session = pages.opened(file, allow_code=allow_code, job=job)
     session.settings = asked
     pages.serve(session, port=port, opens=not no_open, told=_tell)
 

@@ -12,8 +12,10 @@ from selfmotion.shell.documents.joint_limits import (
     joint_limit_notes as joint_limit_notes,
     read_joint_limits as read_joint_limits,
 )
+from selfmotion.shell.documents.named_files import named_from as named_from
 from selfmotion.shell.documents.overrides import (
     grid_documents as grid_documents,
+    keys_of as keys_of,
     parse_setting as parse_setting,
     set_key as set_key,
     write_combination as write_combination,

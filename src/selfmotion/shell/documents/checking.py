@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from selfmotion.basics import ANGLES, FORMER_CLEARANCE, LENGTHS, FileFormatError
+from selfmotion.basics import ANGLES, FORMER_CLEARANCE, LENGTHS, FileFormatError, nearest
 from selfmotion.shell.documents.models import clearance_model, document_model, path_model
 
 _UNITS = {"_deg": ANGLES, "_mm": LENGTHS}
@@ -166,7 +166,9 @@ def _what(error: Any, document: Mapping[str, Any], unit: str = "") -> str:
             return f"has no key '{tag}', which says what it is"
         case "union_tag_invalid":
             tag = context["discriminator"].strip("'")
-            return f"{tag} is '{context['tag']}', expected one of: {context['expected_tags']}"
+            kinds = re.findall(r"'([^']*)'", context["expected_tags"])
+            near = nearest(context["tag"], kinds)
+            return f"{tag} is '{context['tag']}', expected one of: {context['expected_tags']}{near}"
         case "model_type" | "dict_type" | "model_attributes_type":
             return f"is {error['input']!r}, expected a table of keys"
         case "list_type":

@@ -137,6 +137,10 @@ _PATH_FILE: _Fields = {
     **_BOUNDS,
     **_WOVEN,
 }
+# How the loop with a controller runs, for `selfmotion follow`.
+_LOOP: _Fields = dict.fromkeys(
+    ("horizon", "period", "cycle", "latency", "silence", "seconds"), (Number, None)
+)
 # A cost that is a function of one's own.
 _FUNCTION: _Fields = {
     "kind": (Literal["function"], ...),
@@ -207,6 +211,7 @@ def _document_model(kinds: tuple[type, ...]) -> type[BaseModel]:
         "tolerance": (model_of(Tolerance), None),
         "max_evaluations": (Whole, None),
         "outputs": (Names, None),
+        "loop": (_model("Loop", _LOOP), None),
         "grid": (Table, None),
     }
     return _model("Problem", fields, "A planning problem.")

@@ -144,6 +144,12 @@ def _key_of_joint_degrees(document: Any, where: str = "") -> str:
     return ""
 
 
+def _usual_task(robot: RobotModel) -> Task:
+    """Return the task of a document that says none: of an arm in the plane of x and y that."""
+    is_planar = robot.can_follow(Task.PLANAR) and not robot.can_follow(Task.POSITION)
+    return Task.PLANAR if is_planar else Task.POSE
+
+
 # Note on a file that says a clearance as one of its constraints.
 _FORMER_CLEARANCE_NOTE = (
     'constraints: kind = "Clearance" is read for one more version; give the table [clearance], or '
@@ -184,7 +190,7 @@ class _Reader:
         with _naming_errors(file, "robot"):
             robot = self._cached(table["robot"], self._robot)
         self._check_degrees(robot)
-        task = Task.of(table.get("task", "pose"))
+        task = Task.of(table["task"]) if "task" in table else _usual_task(robot)
         with _naming_errors(file, "start"):
             setting = table.get("start", "free")
             start = self._cached(

@@ -180,6 +180,9 @@ def path_of(
     match kind:
         case "file":
             del values["kind"]
+            if "columns" in values:
+                # One text may have them all.
+                values["columns"] = ",".join(values["columns"])
             path: Path = read_path(file_beside(values.pop("file")), **values)
             path = path if frame is not None else in_reference(path, robot)
         case "circle":

@@ -69,17 +69,27 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
     "Problem": {
         "robot": "The arm, or the cell.",
         "path": "The tool motion.",
-        "task": "Which rows of the tool's pose are prescribed.",
+        "task": "Which rows of the tool's pose are prescribed; by default pose, of an "
+        "arm in a plane planar.",
         "start": "The start configuration [rad or m], or which; by default free: many are tried.",
         "workpiece": "What paths and bodies are placed with.",
         "joint_limits": "A MoveIt file of joint limits that count besides the arm's own.",
         "optimiser": "The published method's quasi-Newton method, and its numbers.",
         "grid": "Values to try for keys, for `selfmotion batch`: a list for each.",
+        "loop": "How `selfmotion follow` runs the loop with a controller.",
         "seams": "Seams of a job, for `selfmotion job`: a list, or one table with a file of them.",
         "job": "How a job is planned.",
         "also": "What else of the arm follows a path at the same time: their rows are prescribed.",
         "clearance": "How far bodies keep apart, and which; by default links must not overlap. "
         "False to leave that out.",
+    },
+    "Loop": {
+        "horizon": "How far ahead is planned [s]; 2 by default.",
+        "period": "Time between states [s]; 0.01 by default.",
+        "cycle": "Time between set-points [s]; 0.001 by default.",
+        "latency": "From measuring a state until the arm follows its segment [s]; 0 by default.",
+        "silence": "Without a state for so long it ends [s]; 5 by default.",
+        "seconds": "How long it runs [s]; by default until it is stopped.",
     },
     "Robot": {
         "name": "An arm that is known by name; see `selfmotion robots`.",

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.planning.result import Plan
+from selfmotion.shell.facts import plan_facts
 from selfmotion.shell.replay import links, scene, three
-from selfmotion.shell.replay.facts import facts, table
+from selfmotion.shell.replay.facts import cells, table
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
     ClearanceCurve,
@@ -163,7 +164,7 @@ def _layers(motions: list[_Motion]) -> list[Json]:
 
 def _compared(plan: Plan, beside: Plan) -> list[Json]:
     """Return the rows of two plans, both with the cost that the first one has to have least of."""
-    rows = table([facts(plan), facts(beside)])
+    rows = table([cells(plan_facts(each)) for each in (plan, beside)])
     cost = sum(beside.evaluate(item) for item in plan.problem.costs)
     for row in rows:
         if row["label"] == "cost":

@@ -12,8 +12,9 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.redundancy import PIXELS
 from selfmotion.planning.result import Plan
+from selfmotion.shell.facts import plan_facts
 from selfmotion.shell.replay import scene
-from selfmotion.shell.replay.facts import Cell, describe, facts
+from selfmotion.shell.replay.facts import Cell, cells, describe
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import (
     CURVE_POINTS,
@@ -165,7 +166,7 @@ class PlanReplay:
     @property
     def facts(self) -> dict[str, Cell]:
         """Its report and certificate."""
-        return facts(self.plan)
+        return cells(plan_facts(self.plan))
 
     @property
     def plans(self) -> Sequence[tuple[float, str, Plan]]:

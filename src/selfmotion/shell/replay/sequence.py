@@ -17,8 +17,9 @@ from selfmotion.planning.optimise import Status
 from selfmotion.planning.result import Move, Parts, Plan, Report
 from selfmotion.problem.constraints import NO_OVERLAP, Constraint, clearances_among
 from selfmotion.problem.problem import Problem
+from selfmotion.shell.facts import program_facts
 from selfmotion.shell.replay import scene, three
-from selfmotion.shell.replay.facts import Cell
+from selfmotion.shell.replay.facts import Cell, cells
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import CURVE_POINTS, ClearanceCurve, Curves, SelfMotion
 from selfmotion.shell.replay.redundancy import FEWER_PIXELS, MOST_SEAMS, SeamMaps, slices
@@ -34,8 +35,6 @@ _MOVE_COLOR = (138, 145, 156)
 _EVENT_COLOR = (194, 24, 91)
 # Thickness of moves relative to seams.
 _THIN = 0.4
-# So many of the longest moves are named.
-_LONGEST = 3
 
 
 def seam_color(number: int) -> str:
@@ -121,16 +120,9 @@ class SequenceReplay:
     @property
     def facts(self) -> dict[str, Cell]:
         """What a reader wants to know of it: label → number and remark."""
-        moves = [mark for mark in self.marks if not mark.is_seam]
-        longest = sorted(moves, key=lambda mark: mark.begin - mark.end)[:_LONGEST]
-        names = ", ".join(f"{mark.name} {mark.end - mark.begin:.2f} s" for mark in longest)
-        seconds = sum(mark.end - mark.begin for mark in moves)
-        return {
-            "verdict": (self.verdict, ""),
-            "duration": (f"{self.marks[-1].end:.4g} s", ""),
-            "seams": (str(len(self.marks) - len(moves)), ""),
-            "moves": (f"{seconds:.4g} s", f"longest: {names}" if names else ""),
-        }
+        moves = [(mark.name, mark.end - mark.begin) for mark in self.marks if not mark.is_seam]
+        seams = len(self.marks) - len(moves)
+        return cells(program_facts(self.verdict, self.marks[-1].end, seams, moves))
 
     def points(self, *, brief: bool = False) -> int:
         """See `Replayed.points`; a brief page needs as many."""

@@ -1,14 +1,12 @@
 """The tables of a process sheet: each number is from a certificate, a report or margins."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from selfmotion.certificate import LIMIT_NAMES, Extreme, Finding
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Plan
+from selfmotion.shell.facts import Fact, finding_facts, margin_facts, plan_facts, with_unit
 from selfmotion.shell.replay.sequence import seam_color
 from selfmotion.work.job import Program, Step
 from selfmotion.work.margins import Margins
@@ -42,8 +40,11 @@ def plan_sections(plan: Plan, margins: Margins | None) -> tuple[Section, ...]:
     sections = [_what(plan)]
     if margins is not None:
         sections.append(_margins(margins))
-    sections += [_path(plan), _kept(plan), _active(plan), _used(plan), _reversals(plan)]
-    sections += [_approaches(plan), _feeds(plan), _assumed(_assumptions(plan))]
+    facts = plan_facts(plan)
+    sections += [_path(plan, facts), _kept(plan), _of_group("Motion", facts, "motion")]
+    sections += [_active(plan), _used(plan), _reversals(plan)]
+    sections += [_of_group("Closest approaches", facts, "near"), _feeds(plan)]
+    sections.append(_assumed(_assumptions(plan)))
     return tuple(section for section in sections if section.rows)
 
 
@@ -119,7 +120,7 @@ def _feed_text(plan: Plan) -> str:
 
 def _closest(plan: Plan) -> str:
     near = min(plan.approaches.values(), key=lambda each: each.value, default=None)
-    return "" if near is None else f"{near.value * 1e3:.4g} mm, {near.name}"
+    return "" if near is None else f"{with_unit(near.value, 'm')}, {near.name}"
 
 
 def _events(program: Program) -> Section:
@@ -155,62 +156,45 @@ def _assumptions_of(program: Program) -> Iterator[str]:
 
 
 def _margins(margins: Margins, of: str = "") -> Section:
-    rows = [
-        (item.name, kind, found.size, found.reason)
-        for item in margins.subjects
-        for kind, found in item.rows
-    ]
+    rows = [(fact.label, fact.number, fact.where) for fact in margin_facts(margins)]
     about = "; ".join(f"{item.name}: about {item.about}" for item in margins.subjects)
     return Section(
         f"{of}How far it may be off while the program runs unchanged",
-        ("", "", "margin", "what stops more"),
+        ("", "margin", "what stops more"),
         tuple(rows),
         f"Judged: {margins.judged}. Rotations of the {about}.",
     )
 
 
-def _path(plan: Plan) -> Section:
-    check = plan.certificate
+def _of_group(title: str, facts: Sequence[Fact], group: str, note: str = "") -> Section:
     rows = [
-        _extreme("position error", check.position_error, "m", ".2e"),
-        _extreme("rotation error", check.rotation_error, "rad", ".2e"),
+        (fact.label, fact.number, fact.time, ", ".join(filter(None, (fact.where, fact.remark))))
+        for fact in facts
+        if fact.group == group
     ]
-    for position, rotation in check.others:
-        rows.append(_extreme(f"position error of {position.name}", position, "m", ".2e"))
-        rows.append(_extreme(f"rotation error of {rotation.name}", rotation, "rad", ".2e"))
-    for worst in check.deviations:
-        unit = "rad" if "r" in worst.name else "m"
-        rows.append(_extreme(f"off the path, as allowed: {worst.name}", worst, unit, ".4g"))
-    rows.append(_extreme("smallest singular value", check.smallest_singular_value, "", ".4g"))
-    allowed = f"Allowed: {check.tolerance.position:.3g} m and {check.tolerance.rotation:.3g} rad."
-    return Section("Path, at all times", ("", "worst", "at", "of"), tuple(rows), allowed)
+    return Section(title, ("", "worst", "at", "of"), tuple(rows), note)
+
+
+def _path(plan: Plan, facts: Sequence[Fact]) -> Section:
+    allowed = plan.certificate.tolerance
+    position, rotation = with_unit(allowed.position, "m"), with_unit(allowed.rotation, "rad")
+    note = f"Allowed: {position} and {rotation}."
+    return _of_group("Path, at all times", facts, "path", note)
 
 
 def _kept(plan: Plan) -> Section:
     rows = [
         (
-            finding.requirement,
-            _found(plan, finding),
-            f"{finding.time:.3f} s",
-            finding.subject,
-            "kept" if finding.satisfied else "NOT KEPT",
+            fact.label,
+            f"{fact.number} ({fact.limit})" if fact.limit else fact.number,
+            fact.time,
+            fact.where,
+            "kept" if fact.kept else "NOT KEPT",
         )
-        for finding in plan.certificate.findings
-        if finding.requirement != "feed"
+        for fact in finding_facts(plan.certificate, plan.robot)
+        if fact.label != "feed"
     ]
     return Section("Requirements, at all times", ("", "worst", "at", "of", ""), tuple(rows))
-
-
-def _found(plan: Plan, finding: Finding) -> str:
-    """Return what was found and what is allowed, with the unit."""
-    if finding.requirement == LIMIT_NAMES[0]:
-        names = {finding.subject} & set(plan.robot.joint_names)
-        return f"{finding.amount:.4g} {plan.robot.unit_of(*names)} left"
-    if finding.requirement == "clearance":
-        return f"{finding.amount * 1e3:.4g} mm (at least {finding.allowed * 1e3:.4g})"
-    if finding.allowed == 1.0 and not finding.unit:
-        return f"{finding.amount:.1%} of the limit"
-    return f"{finding.amount:.4g} {finding.unit} (allowed {finding.allowed:.4g})"
 
 
 def _active(plan: Plan) -> Section:
@@ -251,14 +235,6 @@ def _reversals(plan: Plan) -> Section:
     return Section("Joint reversals", ("", "", "at [s]"), tuple(rows) or (("none", "", ""),))
 
 
-def _approaches(plan: Plan) -> Section:
-    rows = [
-        (name, f"{near.value * 1e3:.4g} mm", f"{near.time:.3f} s", near.name)
-        for name, near in plan.approaches.items()
-    ]
-    return Section("Closest approaches", ("to", "", "at", "between"), tuple(rows))
-
-
 def _feeds(plan: Plan) -> Section:
     rows = [
         (
@@ -295,8 +271,3 @@ def _assumptions(plan: Plan) -> Iterator[str]:
     yield from check.notes
     for item in check.damped:
         yield f"damped {item}"
-
-
-def _extreme(label: str, worst: Extreme, unit: str, form: str) -> tuple[str, ...]:
-    time = "" if np.isnan(worst.time) else f"{worst.time:.3f} s"
-    return label, f"{worst.value:{form}} {unit}".strip(), time, worst.name

@@ -323,7 +323,7 @@ class _Reader:
             lengths = {None: "no UNITS", _INCH: "UNITS/INCHES", _MM: "UNITS/MM"}[self._stated_unit]
             raise self.machine.fault(
                 f"feeds are in {feeds}, and the file has {lengths}: say in which unit its lengths "
-                f"are: unit = 'in' or 'mm' (--unit)"
+                f"are: unit = 'in' or 'mm'"
             )
 
     def _go(self, word: str, arguments: list[str]) -> None:

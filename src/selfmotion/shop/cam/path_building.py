@@ -217,9 +217,9 @@ def _with_deviation_note(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -
     if distances[worst] > pacing.tolerance:
         has_feed = rows.feed is not None or pacing.feed is not None
         remedy = (
-            f"corners round (--corners round) keeps {1e3 * pacing.tolerance:g} mm"
+            f"corners round (--set path.corners=round) keeps {1e3 * pacing.tolerance:g} mm"
             if has_feed
-            else "give more poses, or corners stop (--corners stop)"
+            else "give more poses, or corners stop (--set path.corners=stop)"
         )
         # Of the ends of that leg, the one where it bends more.
         bends = np.concatenate([[1.0], cosines, [1.0]])[worst : worst + 2]
@@ -588,7 +588,7 @@ def _times(
         raise FileFormatError(
             f"{file}: {rows.labels[int(standing[0]) + 1]}: the tool does not move from the pose "
             f"before, which takes no time by feed or duration; give a column t, or a feed with "
-            f"corners round (--corners round), where the tool turns in place"
+            f"corners round (--set path.corners=round), where the tool turns in place"
         )
     if rows.feed is not None:
         return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))

@@ -316,7 +316,7 @@ def _si_column(file: FilePath, title: str) -> tuple[str, float]:
             f"{file}: unknown column '{title}'{nearest(title, _SUGGESTED)}, expected "
             f"t, feed, seam, event, x,y,z and "
             f"{' or '.join(','.join(names) for names in _ORIENTATIONS)}; to leave a column out, "
-            f"call it - in columns (--columns -,x,y,z)"
+            f"call it - in columns (--set path.columns=-,x,y,z)"
         )
     return name, scale
 

@@ -45,6 +45,7 @@ from selfmotion.shop.controllers.program_files import (
 )
 from selfmotion.shop.controllers.program_settings import (
     ProgramSettings as ProgramSettings,
+    program_settings_of as program_settings_of,
     read_program_settings as read_program_settings,
 )
 from selfmotion.shop.controllers.program_steps import parts_of as parts_of

@@ -1,4 +1,12 @@
-"""Arcs through three tool poses, and how far they turn."""
+r"""Circular steps between tool poses, as ``SCIRC``, ``MoveC`` and ``movec`` make them.
+
+The position goes along the circle through the begin, a via point and the end, evenly. The
+orientation turns from that of the begin to that of the end about one axis evenly, relative to the
+work object, and external axes are linear, as in a straight step. The makers document that
+orientation for ``$CIRC_TYPE = #BASE`` (KUKA), ``CirPathMode \ObjectFrame`` (ABB) and ``mode=0``
+(Universal Robots). A via pose is in the middle of its step in all of that, so that a controller
+that heeds its orientation does the same.
+"""
 
 from typing import NamedTuple
 

@@ -169,7 +169,7 @@ def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) ->
     if form == "rapid" and settings.mass is None:
         raise ProblemError(
             f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
-            f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
+            f"of ABB moves by it; give export --set mass=KG, or mass in the file of --settings "
             f"(ProgramSettings(mass=…))"
         )
     joint = axis_inside_arm(robot, axes_of(robot, settings)) if form == "krl" else ""

@@ -214,15 +214,27 @@ def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettin
     """
     path = as_path(file)
     try:
-        values: dict[str, Any] = in_si(read_document(path))
+        document = read_document(path)
     except FileFormatError as error:
         text = str(error).removeprefix(f"{path}: ")
         raise FileFormatError(f"{path}: {text}") from error
+    return program_settings_of(document, str(path), **changes)
+
+
+def program_settings_of(document: Mapping[str, Any], where: str, **changes: Any) -> ProgramSettings:
+    """Return the settings of a table, as `read_program_settings` of a file's.
+
+    Errors begin with `where` the table is from.
+    """
+    try:
+        values: dict[str, Any] = in_si(document)
+    except FileFormatError as error:
+        raise FileFormatError(f"{where}: {error}") from error
     keys = [item.name for item in dataclasses.fields(ProgramSettings)]
     for key in values:
         if key not in keys:
             raise FileFormatError(
-                f"{path}: unknown key '{key}'{nearest(key, keys)}; expected {', '.join(keys)}"
+                f"{where}: unknown key '{key}'{nearest(key, keys)}; expected {', '.join(keys)}"
             )
     try:
         for key in {"deviation", "move_deviation"} & set(values):
@@ -231,12 +243,26 @@ def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettin
                 raise ProblemError(f"{key}: expected a table of position and rotation")
             values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **value})
         if not isinstance(values.get("work_object", ""), str):
-            values["work_object"] = pose_of(values["work_object"])
+            values["work_object"] = _work_object(values["work_object"])
         return ProgramSettings(**{**values, **changes})
     except SelfmotionError as error:
-        raise FileFormatError(f"{path}: {error}") from error
+        raise FileFormatError(f"{where}: {error}") from error
     except ValueError as error:
-        raise FileFormatError(f"{path}: work_object: {error}") from error
+        raise FileFormatError(f"{where}: work_object: {error}") from error
+
+
+def _work_object(table: Any) -> SE3:
+    """Return the pose of a table, whose rotation vector is no angles in degrees."""
+    turn = table.get("rotation_vector", ()) if isinstance(table, Mapping) else ()
+    pose = pose_of(table)
+    angle = float(np.linalg.norm(np.asarray(turn, dtype=np.float64)))
+    if angle > np.pi * (1.0 + 1e-4):
+        raise ProblemError(
+            f"work_object: has a rotation vector of {angle:.4g} rad, more than half a turn; in "
+            f"degrees, or angles about axes? Expected the axis of one turn, as long as its angle "
+            f"in rad: 0, 0, 1.5708 is 90° about z"
+        )
+    return pose
 
 
 def _signal(event: object, setting: object) -> Signal | None:

@@ -256,7 +256,7 @@ def moving_ends(plan: Plan | Parts | Move | Program) -> str:
             return (
                 f"joint '{motion.joint_names[joint]}' {verb} at {speeds[joint]:.3g} {unit} at "
                 f"t = {motion.t[row]:.6g} s, and controllers take motions from rest to rest: plan "
-                f"it with a ramp (--ramp 0.5)"
+                f"it with a ramp (--set path.ramp=0.5)"
             )
     return ""
 

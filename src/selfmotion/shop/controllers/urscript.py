@@ -373,5 +373,5 @@ class UrscriptReader(ProgramReader):
     def _refuse_stream(self, stream: str) -> None:
         raise self.lines.fault(
             "a stream of servoj is not read; only programs of linear motions are, which "
-            "export --targets poses writes"
+            "export --set targets=poses writes"
         )

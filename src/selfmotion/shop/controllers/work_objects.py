@@ -103,7 +103,7 @@ def turned_base(robot: RobotModel) -> str:
         return ""
     return (
         f"work objects are counted in '{base}', the controller's frame, which is turned by "
-        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
+        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', in which --frame counts; work_object "
         f"{OF_PATH} is the frame of the path"
     )
 

@@ -1,4 +1,8 @@
-"""Stops with several states each, and their precedences."""
+"""Stops with several states each, costs of transitions, and precedences.
+
+It knows only numbers. A stop (a seam) has states (a direction and a branch of configurations);
+each transition from one state to another has a cost.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

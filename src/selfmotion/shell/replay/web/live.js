@@ -1,6 +1,6 @@
 // The page while its problem is changed: what is asked of the server, and what it tells.
 
-const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to a joint limit, least", "speed, most", "duration"];
+const TOLD = ["cost", "seams", "moves", "limits used fully", "margin to joint limits", "speed", "duration"];
 // How the server ends a connection: without the token, and where another tab has the page.
 const REFUSED = 4403;
 const TAKEN = 4409;
@@ -168,7 +168,7 @@ class Live {
     get("figures").style.gridTemplateColumns = `auto${" auto".repeat(columns.length)}`;
     if (columns.length > 1) for (const name of ["", ...columns]) element(get("figures"), "dt", {}, name);
     for (const { label, cells } of rows) {
-      element(get("figures"), "dt", {}, label.replace(", least", "").replace(", most", ""));
+      element(get("figures"), "dt", {}, label);
       // Where and when is in the table below: here the numbers leave room for the map.
       for (const [value, note] of cells) element(get("figures"), "dd", note ? { title: note } : {}, value);
     }
