@@ -202,7 +202,12 @@ class HullDistances:
         return float(value)
 
     def closer(
-        self, q: Array, bounds: Array, margin: float, decide: Sequence[bool]
+        self,
+        q: Array,
+        bounds: Array,
+        margin: float,
+        decide: Sequence[bool],
+        travelled: Array | None = None,
     ) -> tuple[Flags, list[tuple[int, int, float]]]:
         """Return at which samples a pair that decides is closer than the margin, (K,).
 
@@ -216,6 +221,9 @@ class HullDistances:
             [m].
         decide : sequence of bool
             Which pairs do.
+        travelled : (K, P), optional
+            How far the bodies of each pair move against each other at most from the first sample
+            to each other one, one after the other: where few samples decide, others need none [m].
 
         Returns
         -------
@@ -229,15 +237,20 @@ class HullDistances:
         order = np.lexsort((least, rows))
         found, left = np.zeros(len(q), dtype=bool), []
         placed = met = -1
+        # How far a pair may have travelled in which it keeps the margin, by its last distance.
+        until = [-math.inf] * bounds.shape[1]
+        way = np.zeros(len(rows)) if travelled is None else travelled[rows, pairs]
         # Lists: with arrays for each sample Python would take longer than the distances.
-        wanted = zip(*(part[order].tolist() for part in (rows, pairs, least)), strict=True)
-        for row, pair, bound in wanted:
-            if row == met:
+        wanted = zip(*(part[order].tolist() for part in (rows, pairs, least, way)), strict=True)
+        for row, pair, bound, passed in wanted:
+            if row == met or passed <= until[pair]:
                 continue
             if row != placed:
                 self.place(q[row])
                 placed = row
             value = self.distance(pair, bound)
+            if travelled is not None:
+                until[pair] = passed + value - margin
             if value < margin:
                 if decide[pair]:
                     found[row], met = True, row
