@@ -201,19 +201,21 @@ def closest_at_all_times(
     goal = _goal(best, distance)
     need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
     values = model.distances(trajectory(edges), goal + need, goal + _HULLS_DO * need)
-    sides = np.stack([values[:-1], values[1:]], axis=1)
+    sides, pairs = np.stack([values[:-1], values[1:]], axis=1), np.arange(len(model.pairs))
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
         chunks = _chunks(len(sides))
-        decided = [_bounds(lengths[chunk], sides[chunk], lever_arms) >= goal for chunk in chunks]
-        rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in decided]))
+        each = [_bounds(lengths[chunk], sides[chunk], lever_arms) >= goal for chunk in chunks]
+        decided = np.concatenate(each)
+        rows, some = (np.flatnonzero(~decided.all(axis=axis)) for axis in (1, 0))
         if not rows.size or approach.closest.value < distance:
             return approach
         if len(rows) > _MOST:
             break
-        intervals, lengths, sides = intervals[rows], lengths[rows], sides[rows]
         # Decided pairs need no number.
-        known = np.concatenate(decided)[rows]
+        pairs, lever_arms = pairs[some], lever_arms[some]
+        known = decided[np.ix_(rows, some)]
+        intervals, lengths, sides = intervals[rows], lengths[rows], sides[rows][:, :, some]
         np.copyto(sides, np.inf, where=known[:, None])
         left = _halvings_left(intervals, float(edges[1] - edges[0]))
         parts = 2 ** np.minimum(_halvings(lengths, sides, lever_arms, goal), left)
@@ -231,14 +233,15 @@ def closest_at_all_times(
             need = np.maximum(before @ lever_arms.T, behind @ lever_arms.T)
             exact_below = goal + _HULLS_DO * need
             settled = known[row[chunk]]
-            bounds_wanted = np.where(settled, -np.inf, goal + need)
-            values = model.distances(trajectory(inner[chunk]), bounds_wanted, exact_below)
+            wanted, exact = np.full((2, len(need), len(model.pairs)), -np.inf)
+            wanted[:, pairs], exact[:, pairs] = np.where(settled, -np.inf, goal + need), exact_below
+            values = model.distances(trajectory(inner[chunk]), wanted, exact)[:, pairs]
             found[chunk] = np.where(settled, np.inf, values)
-            approach = _nearer(approach, model, inner[chunk], found[chunk], exact_below)
+            approach = _nearer(approach, model, pairs, inner[chunk], found[chunk], exact_below)
         intervals, sides = _divided(intervals, inner, parts), _divided(sides, found, parts)
         goal = _goal(approach.closest, distance)
     bounds = _bounds(lengths, sides, lever_arms)
-    return _undecided(model, approach, intervals, sides[:, 0], bounds, distance)
+    return _undecided(model, approach, pairs, intervals, sides[:, 0], bounds, distance)
 
 
 def _chunks(count: int) -> list[slice]:
@@ -256,13 +259,14 @@ def _halvings(lengths: Array, sides: Array, lever_arms: Array, goal: float) -> I
     wanted = np.max(ways / np.where(room > 0.0, room, np.inf), axis=1)
     # Written so that NaN asks for no more than one.
     few = np.log2(np.where(wanted > 2.0, wanted, 2.0))
-    return np.ceil(np.minimum(few, _AT_ONCE if len(sides) <= _MANY else 1)).astype(np.int64)
+    most = _AT_ONCE if len(sides) <= _MANY else 1
+    return np.asarray(np.ceil(np.minimum(few, most)), dtype=np.int64)
 
 
 def _halvings_left(intervals: Array, longest: float) -> Ints:
     """Return how often intervals (I, 2) may be halved, of which the first were `longest` [s]."""
     shares = np.maximum(intervals[:, 1] - intervals[:, 0], np.finfo(float).tiny) / longest
-    return np.maximum(np.rint(np.log2(shares)) + _DEPTH, 0.0).astype(np.int64)
+    return np.asarray(np.maximum(np.rint(np.log2(shares)) + _DEPTH, 0.0), dtype=np.int64)
 
 
 def _inner(parts: Ints) -> tuple[Ints, Array]:
@@ -302,19 +306,26 @@ def _goal(best: Closest, distance: float) -> float:
 
 
 def _nearer(
-    approach: Approach, model: CollisionModel, t: Array, values: Array, exact_below: Array
+    approach: Approach,
+    model: CollisionModel,
+    pairs: Ints,
+    t: Array,
+    values: Array,
+    exact_below: Array,
 ) -> Approach:
     """Return the smaller of an approach and distances (K, P) at times (K,), where exact."""
     known = np.where(values < exact_below, values, np.inf)
     row, pair = np.unravel_index(int(np.argmin(known)), known.shape)
     if not known[row, pair] < approach.closest.value:
         return approach
-    return Approach(Closest(float(known[row, pair]), *model.pairs[int(pair)]), float(t[row]))
+    near = Closest(float(known[row, pair]), *model.pairs[int(pairs[pair])])
+    return Approach(near, float(t[row]))
 
 
 def _undecided(
     model: CollisionModel,
     approach: Approach,
+    pairs: Ints,
     intervals: Array,
     first: Array,
     bounds: Array,
@@ -330,6 +341,6 @@ def _undecided(
         return approach
     least = int(np.argmin(np.where(np.isnan(bounds), -np.inf, bounds)))
     row, pair = np.unravel_index(least, bounds.shape)
-    near = Closest(float(first[row, pair]), *model.pairs[int(pair)])
+    near = Closest(float(first[row, pair]), *model.pairs[int(pairs[pair])])
     start, end = intervals[row]
     return Approach(near, float(start), float(end))
