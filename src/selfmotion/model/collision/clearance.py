@@ -121,7 +121,6 @@ class ClearanceModel:
         # Which joints move the first body, less those that move the second.
         self._sides = moved[first] - moved[second]
         self._last: tuple[Array, Array] | None = None
-        self._has_moved = False
 
     def clearances(self, q_samples: npt.ArrayLike) -> Clearances:
         """Return the distances at samples (K, n).
@@ -162,7 +161,7 @@ class ClearanceModel:
         selected = self._selected
         bounds[:, selected] = self._hulls.lower_bounds(q, margin)[:, selected]
         every, travelled = np.ones(len(self._of), dtype=bool).tolist(), None
-        if not self._has_moved:
+        if not self._hulls.has_moved:
             steps = np.abs(np.diff(q, axis=0, prepend=q[:1]))
             travelled = np.cumsum(steps, axis=0) @ self._levers(q)[self._of].T
         return self._hulls.closer(q, bounds, margin, every, travelled)[0]
@@ -176,7 +175,7 @@ class ClearanceModel:
 
         These were at samples nearby where a motion is optimised.
         """
-        if self._has_moved or self._last is None or self._last[0].shape != q.shape:
+        if self._hulls.has_moved or self._last is None or self._last[0].shape != q.shape:
             return -np.inf
         before, values = self._last
         levers = self._levers(np.concatenate([before, q]))[self._of[self._selected]]
@@ -189,8 +188,6 @@ class ClearanceModel:
         """
         item = next(item for item in self._exact.obstacles if item.name == obstacle)
         self._hulls.move(obstacle, place_of(item, pose, self.robot)[1])
-        # Levers are those of where it was.
-        self._has_moved = True
 
     @property
     def pair_levers(self) -> Array:

@@ -131,6 +131,11 @@ class HullDistances:
     bodies : sequence of Body
     pairs : (P, 2)
         Indices of bodies.
+
+    Attributes
+    ----------
+    has_moved : bool
+        Whether an obstacle was put somewhere else: levers of pairs are those of where it was.
     """
 
     def __init__(
@@ -139,6 +144,7 @@ class HullDistances:
         bodies: Sequence[Body],
         pairs: Ints,
     ) -> None:
+        self.has_moved = False
         self.pairs, self._robot, self._bodies = pairs, robot, tuple(bodies)
         self._boxes = BoundingBoxes(robot, bodies)
         self._sizes = (2.0 * self._boxes.radii[pairs].sum(axis=1) + _ROUNDING).tolist()
@@ -161,6 +167,7 @@ class HullDistances:
 
     def move(self, obstacle: str, place: pin.SE3) -> None:
         """Put an obstacle somewhere else in the frame of the joint that carries it."""
+        self.has_moved = True
         for index, body in enumerate(self._bodies):
             if body.name == obstacle:
                 body = replace(body, place=place)
