@@ -1,5 +1,6 @@
 """Clearances of hulls: conservative, with exact gradients, level far away, on every arm."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,42 @@ def test_what_is_closer_is_known_without_slopes(models) -> None:
         closer = model.closer(q, margin)
         np.testing.assert_array_equal(closer[decided], (values < margin).any(axis=1)[decided])
     assert model.closer(q, NEAR).any()
+
+
+def test_what_was_asked_before_changes_nothing(models) -> None:
+    """Pairs that cannot have come near since then are left out, and those alone."""
+    exact, _ = models
+    model, rng = ClearanceModel(exact, NEAR), np.random.default_rng(3)
+    q = samples(model.robot, 20)
+    for size in (0.0, 1e-4, 1e-2, 0.1, 0.5, 1e-3):
+        q = q + size * rng.uniform(-1.0, 1.0, q.shape)
+        found, alone = model.clearances(q), ClearanceModel(exact, NEAR).clearances(q)
+        np.testing.assert_allclose(found.values, alone.values, atol=GJK)
+        np.testing.assert_allclose(found.jacobian(), alone.jacobian(), atol=1e-9)
+
+
+def test_a_body_that_moves_is_where_it_is_now() -> None:
+    """Whichever of the models that share its hull is told."""
+    exact = CollisionModel(load_robot("panda"), WORLD)
+    models, q = [ClearanceModel(exact, NEAR) for _ in range(2)], samples(exact.robot, 5)
+    assert all((model.clearances(q).values > 0.0).any() for model in models)
+    at = exact.robot.pose(q[0]).translation
+    models[0].move("sphere", pin.SE3(np.eye(3), at))
+    for model in models:
+        meets = np.array([second == "sphere" for _, second in model.pairs])
+        assert model.clearances(q).values[0, meets].min() < 0.0
+        assert model.closer(q, 0.0)[0]
+
+
+def test_what_is_closer_along_a_motion_is_so_at_each_sample(models) -> None:
+    """Distances at a few samples decide those between."""
+    _, model = models
+    ends = samples(model.robot, 8, seed=5)
+    share = np.linspace(0.0, 1.0, 60)[:, None]
+    for first, last in pairwise(ends):
+        q = first + share * (last - first)
+        one_by_one = [bool(model.closer(each[None], 0.5 * NEAR)[0]) for each in q]
+        np.testing.assert_array_equal(model.closer(q, 0.5 * NEAR), one_by_one)
 
 
 def test_no_pair_is_closer_than_its_clearance(models) -> None:

@@ -28,7 +28,7 @@ from selfmotion.basics import Array, Ints, Progress, series, silent
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ChainSeries, RobotModel
 
-# Fewest nodes of an interval.
+# Nodes of an interval are multiples of this: few numbers, of which each takes a pass of its own.
 _FEWEST = 3
 # Nodes of an interval without a majorant.
 _MEASURED = 9
@@ -243,7 +243,7 @@ def _measured(function: BoundedFunction, segments: MotionSegments) -> _Found:
 
 def _nodes(known: Array, function: BoundedFunction) -> tuple[Ints, Array]:
     """Return the number of nodes of each interval (I,), and interpolation errors (B, I)."""
-    powers = np.arange(_FEWEST, series.ORDER + 1)
+    powers = np.arange(_FEWEST, series.ORDER + 1, _FEWEST)
     errors = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
     good = (errors <= function.wanted[:, None, None]).all(axis=0)
     limits = np.full(len(function.blocks), np.inf)

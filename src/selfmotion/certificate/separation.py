@@ -2,8 +2,8 @@
 
 Between two times a and b the distance d of a pair of bodies changes by Σ_j l_j V_j at most, with
 V_j the path length of joint j and l_j the pair's lever arm (`CollisionModel.pair_levers_up_to`). So
-d(t) ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in between. Intervals on which this does not decide are halved,
-starting with few: distant pairs, and pairs that hardly move, are evaluated a few times only.
+d(t) ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in between. Intervals on which this does not decide are
+divided, starting with few: distant pairs, and pairs that hardly move, are evaluated a few times.
 """
 
 from dataclasses import dataclass
@@ -11,20 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 from typing_extensions import override
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.certificate.requirement import Extreme, Finding, FinishedMotion, Requirement
 from selfmotion.model.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
 from selfmotion.model.motion import Trajectory
 
 # Intervals at the start.
 _FIRST = 16
-# Halvings of an interval before it counts as undecided.
+# Halvings of an interval before it counts as undecided …
 _DEPTH = 40
+# … of which so many are done at once at most, or one where there are more intervals than this.
+_AT_ONCE, _MANY = 3, 4096
 # Largest number of intervals at once: the others are undecided.
 _MOST = 200_000
 # Intervals in one chunk, which bounds memory.
 _CHUNK = 4096
-# Hulls are used in place of meshes, which are slow, for pairs that some more halvings decide: share
+# Hulls are used in place of meshes, which are slow, for pairs that more divisions decide: share
 # of the distance that is left.
 _HULLS_DO = 0.05
 # Relative accuracy of the reported smallest distance …
@@ -199,37 +201,47 @@ def closest_at_all_times(
     goal = _goal(best, distance)
     need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
     values = model.distances(trajectory(edges), goal + need, goal + _HULLS_DO * need)
-    sides = np.stack([values[:-1], values[1:]], axis=1)
+    sides, pairs = np.stack([values[:-1], values[1:]], axis=1), np.arange(len(model.pairs))
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
         chunks = _chunks(len(sides))
-        decided = [_bounds(lengths[chunk], sides[chunk], lever_arms) >= goal for chunk in chunks]
-        rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in decided]))
+        each = [_bounds(lengths[chunk], sides[chunk], lever_arms) >= goal for chunk in chunks]
+        decided = np.concatenate(each)
+        rows, some = (np.flatnonzero(~decided.all(axis=axis)) for axis in (1, 0))
         if not rows.size or approach.closest.value < distance:
             return approach
         if len(rows) > _MOST:
             break
-        intervals, lengths, sides = intervals[rows], lengths[rows], sides[rows]
         # Decided pairs need no number.
-        known = np.concatenate(decided)[rows]
+        pairs, lever_arms = pairs[some], lever_arms[some]
+        known = decided[np.ix_(rows, some)]
+        intervals, lengths, sides = intervals[rows], lengths[rows], sides[rows][:, :, some]
         np.copyto(sides, np.inf, where=known[:, None])
-        middle = intervals.mean(axis=1)
-        between, inner = length_at(middle), np.empty_like(sides[:, 0])
-        for chunk in _chunks(len(rows)):
-            (before, after), here = lengths[chunk].swapaxes(0, 1), between[chunk]
-            need = np.maximum((here - before) @ lever_arms.T, (after - here) @ lever_arms.T)
+        left = _halvings_left(intervals, float(edges[1] - edges[0]))
+        parts = 2 ** np.minimum(_halvings(lengths, sides, lever_arms, goal), left)
+        if parts.max() == 1:
+            break
+        row, share = _inner(parts)
+        inner = intervals[row, 0] + share * (intervals[row, 1] - intervals[row, 0])
+        between = length_at(inner)
+        lengths = _divided(lengths, between, parts)
+        ways = lengths[:, 1] - lengths[:, 0]
+        after = np.arange(len(row)) + row + 1
+        found = np.empty((len(row), sides.shape[2]))
+        for chunk in _chunks(len(row)):
+            before, behind = ways[after[chunk] - 1], ways[after[chunk]]
+            need = np.maximum(before @ lever_arms.T, behind @ lever_arms.T)
             exact_below = goal + _HULLS_DO * need
-            bounds_wanted = np.where(known[chunk], -np.inf, goal + need)
-            found = model.distances(trajectory(middle[chunk]), bounds_wanted, exact_below)
-            inner[chunk] = np.where(known[chunk], np.inf, found)
-            approach = _nearer(approach, model, middle[chunk], inner[chunk], exact_below)
-        intervals, lengths, sides = (
-            _halves(each, own)
-            for each, own in ((intervals, middle), (lengths, between), (sides, inner))
-        )
+            settled = known[row[chunk]]
+            wanted, exact = np.full((2, len(need), len(model.pairs)), -np.inf)
+            wanted[:, pairs], exact[:, pairs] = np.where(settled, -np.inf, goal + need), exact_below
+            values = model.distances(trajectory(inner[chunk]), wanted, exact)[:, pairs]
+            found[chunk] = np.where(settled, np.inf, values)
+            approach = _nearer(approach, model, pairs, inner[chunk], found[chunk], exact_below)
+        intervals, sides = _divided(intervals, inner, parts), _divided(sides, found, parts)
         goal = _goal(approach.closest, distance)
     bounds = _bounds(lengths, sides, lever_arms)
-    return _undecided(model, approach, intervals, sides[:, 0], bounds, distance)
+    return _undecided(model, approach, pairs, intervals, sides[:, 0], bounds, distance)
 
 
 def _chunks(count: int) -> list[slice]:
@@ -237,10 +249,42 @@ def _chunks(count: int) -> list[slice]:
     return [slice(first, first + _CHUNK) for first in range(0, count, _CHUNK)]
 
 
-def _halves(sides: Array, middle: Array) -> Array:
-    """Return values at both ends of the halves of intervals, (2 I, 2, …), for theirs (I, 2, …)."""
-    both = np.stack([sides[:, 0], middle, middle, sides[:, 1]], axis=1)
-    return both.reshape(2 * len(sides), *sides.shape[1:])
+def _halvings(lengths: Array, sides: Array, lever_arms: Array, goal: float) -> Ints:
+    """Return how often intervals (I,) are halved, at least once, so that this may decide.
+
+    It does where bodies are in between as far apart as at both ends.
+    """
+    room = sides[:, 0] + sides[:, 1] - 2.0 * goal
+    ways = (lengths[:, 1] - lengths[:, 0]) @ lever_arms.T
+    wanted = np.max(ways / np.where(room > 0.0, room, np.inf), axis=1)
+    # Written so that NaN asks for no more than one.
+    few = np.log2(np.where(wanted > 2.0, wanted, 2.0))
+    most = _AT_ONCE if len(sides) <= _MANY else 1
+    return np.asarray(np.ceil(np.minimum(few, most)), dtype=np.int64)
+
+
+def _halvings_left(intervals: Array, longest: float) -> Ints:
+    """Return how often intervals (I, 2) may be halved, of which the first were `longest` [s]."""
+    shares = np.maximum(intervals[:, 1] - intervals[:, 0], np.finfo(float).tiny) / longest
+    return np.asarray(np.maximum(np.rint(np.log2(shares)) + _DEPTH, 0.0), dtype=np.int64)
+
+
+def _inner(parts: Ints) -> tuple[Ints, Array]:
+    """Return of which interval each inner edge of parts is, and how far into it, (E,)."""
+    row = np.repeat(np.arange(len(parts)), parts - 1)
+    first = np.cumsum(parts - 1) - (parts - 1)
+    return row, (np.arange(len(row)) - first[row] + 1) / parts[row]
+
+
+def _divided(sides: Array, inner: Array, parts: Ints) -> Array:
+    """Return values at both ends of the parts of intervals, for theirs (I, 2, …) and inner ones."""
+    last = np.cumsum(parts + 1) - 1
+    every = np.empty((last[-1] + 1, *sides.shape[2:]))
+    is_inner = np.ones(len(every), dtype=np.bool_)
+    is_inner[last] = is_inner[last - parts] = False
+    every[last - parts], every[last], every[is_inner] = sides[:, 0], sides[:, 1], inner
+    left = np.delete(np.arange(len(every)), last)
+    return np.stack([every[left], every[left + 1]], axis=1)
 
 
 def _bounds(lengths: Array, sides: Array, lever_arms: Array) -> Array:
@@ -262,25 +306,32 @@ def _goal(best: Closest, distance: float) -> float:
 
 
 def _nearer(
-    approach: Approach, model: CollisionModel, t: Array, values: Array, exact_below: Array
+    approach: Approach,
+    model: CollisionModel,
+    pairs: Ints,
+    t: Array,
+    values: Array,
+    exact_below: Array,
 ) -> Approach:
     """Return the smaller of an approach and distances (K, P) at times (K,), where exact."""
     known = np.where(values < exact_below, values, np.inf)
     row, pair = np.unravel_index(int(np.argmin(known)), known.shape)
     if not known[row, pair] < approach.closest.value:
         return approach
-    return Approach(Closest(float(known[row, pair]), *model.pairs[int(pair)]), float(t[row]))
+    near = Closest(float(known[row, pair]), *model.pairs[int(pairs[pair])])
+    return Approach(near, float(t[row]))
 
 
 def _undecided(
     model: CollisionModel,
     approach: Approach,
+    pairs: Ints,
     intervals: Array,
     first: Array,
     bounds: Array,
     distance: float,
 ) -> Approach:
-    """Return the approach that halving does not decide, unless it only concerns the report.
+    """Return the approach that no division decides, unless it only concerns the report.
 
     Pairs (P) have lower bounds `bounds` (I, P) on intervals (I, 2), and distances `first` (I, P) at
     their starts.
@@ -290,6 +341,6 @@ def _undecided(
         return approach
     least = int(np.argmin(np.where(np.isnan(bounds), -np.inf, bounds)))
     row, pair = np.unravel_index(least, bounds.shape)
-    near = Closest(float(first[row, pair]), *model.pairs[int(pair)])
+    near = Closest(float(first[row, pair]), *model.pairs[int(pairs[pair])])
     start, end = intervals[row]
     return Approach(near, float(start), float(end))

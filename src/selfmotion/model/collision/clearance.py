@@ -120,6 +120,7 @@ class ClearanceModel:
         moved = exact.moved.astype(np.float64)
         # Which joints move the first body, less those that move the second.
         self._sides = moved[first] - moved[second]
+        self._last: tuple[Array, Array] | None = None
 
     def clearances(self, q_samples: npt.ArrayLike) -> Clearances:
         """Return the distances at samples (K, n).
@@ -131,11 +132,13 @@ class ClearanceModel:
         """
         q = self._exact.samples(q_samples)
         hulls, reach = self._hulls, self._near + self._width
-        values = hulls.lower_bounds(q, reach)[:, self._selected]
+        bounds = hulls.lower_bounds(q, reach)[:, self._selected]
+        values = np.maximum(bounds, self._least_by_last(q))
         rows, columns = np.nonzero(values < reach)
-        given = rows, self._selected[columns], values[rows, columns]
+        given = rows, self._selected[columns], bounds[rows, columns]
         contacts = hulls.contacts(q, *given, within=reach)
         values[rows, columns] = contacts.values
+        self._last = q.copy(), values.copy()
         slopes = contacts.slopes * self._sides[columns]
         beyond = np.clip(values - self._near, 0.0, self._width)
         slopes *= 1.0 - beyond[rows, columns, None] / self._width
@@ -157,7 +160,26 @@ class ClearanceModel:
         bounds = np.full((len(q), len(self._of)), np.inf)
         selected = self._selected
         bounds[:, selected] = self._hulls.lower_bounds(q, margin)[:, selected]
-        return self._hulls.closer(q, bounds, margin, np.ones(len(self._of), dtype=bool).tolist())[0]
+        every, travelled = np.ones(len(self._of), dtype=bool).tolist(), None
+        if not self._hulls.has_moved:
+            steps = np.abs(np.diff(q, axis=0, prepend=q[:1]))
+            travelled = np.cumsum(steps, axis=0) @ self._levers(q)[self._of].T
+        return self._hulls.closer(q, bounds, margin, every, travelled)[0]
+
+    def _levers(self, q: Array) -> Array:
+        """Return the levers of the exact model's pairs where joints go as far as at q (K, n)."""
+        return self._exact.pair_levers_up_to(np.abs(q).max(axis=0, initial=0.0))
+
+    def _least_by_last(self, q: Array) -> Array | float:
+        """Return lower bounds of the distances at q (K, n), (K, P), by those asked for last.
+
+        These were at samples nearby where a motion is optimised.
+        """
+        if self._hulls.has_moved or self._last is None or self._last[0].shape != q.shape:
+            return -np.inf
+        before, values = self._last
+        levers = self._levers(np.concatenate([before, q]))[self._of[self._selected]]
+        return np.asarray(values - np.abs(q - before) @ levers.T)
 
     def move(self, obstacle: str, pose: SE3) -> None:
         """Put an obstacle somewhere else in its frame, for this model and its `exact` one's hulls.

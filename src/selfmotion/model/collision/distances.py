@@ -131,6 +131,11 @@ class HullDistances:
     bodies : sequence of Body
     pairs : (P, 2)
         Indices of bodies.
+
+    Attributes
+    ----------
+    has_moved : bool
+        Whether an obstacle was put somewhere else: levers of pairs are those of where it was.
     """
 
     def __init__(
@@ -139,6 +144,7 @@ class HullDistances:
         bodies: Sequence[Body],
         pairs: Ints,
     ) -> None:
+        self.has_moved = False
         self.pairs, self._robot, self._bodies = pairs, robot, tuple(bodies)
         self._boxes = BoundingBoxes(robot, bodies)
         self._sizes = (2.0 * self._boxes.radii[pairs].sum(axis=1) + _ROUNDING).tolist()
@@ -161,6 +167,7 @@ class HullDistances:
 
     def move(self, obstacle: str, place: pin.SE3) -> None:
         """Put an obstacle somewhere else in the frame of the joint that carries it."""
+        self.has_moved = True
         for index, body in enumerate(self._bodies):
             if body.name == obstacle:
                 body = replace(body, place=place)
@@ -202,7 +209,12 @@ class HullDistances:
         return float(value)
 
     def closer(
-        self, q: Array, bounds: Array, margin: float, decide: Sequence[bool]
+        self,
+        q: Array,
+        bounds: Array,
+        margin: float,
+        decide: Sequence[bool],
+        travelled: Array | None = None,
     ) -> tuple[Flags, list[tuple[int, int, float]]]:
         """Return at which samples a pair that decides is closer than the margin, (K,).
 
@@ -216,6 +228,9 @@ class HullDistances:
             [m].
         decide : sequence of bool
             Which pairs do.
+        travelled : (K, P), optional
+            How far the bodies of each pair move against each other at most from the first sample
+            to each other one, one after the other: where few samples decide, others need none [m].
 
         Returns
         -------
@@ -229,15 +244,20 @@ class HullDistances:
         order = np.lexsort((least, rows))
         found, left = np.zeros(len(q), dtype=bool), []
         placed = met = -1
+        # How far a pair may have travelled in which it keeps the margin, by its last distance.
+        until = [-math.inf] * bounds.shape[1]
+        way = np.zeros(len(rows)) if travelled is None else travelled[rows, pairs]
         # Lists: with arrays for each sample Python would take longer than the distances.
-        wanted = zip(*(part[order].tolist() for part in (rows, pairs, least)), strict=True)
-        for row, pair, bound in wanted:
-            if row == met:
+        wanted = zip(*(part[order].tolist() for part in (rows, pairs, least, way)), strict=True)
+        for row, pair, bound, passed in wanted:
+            if row == met or passed <= until[pair]:
                 continue
             if row != placed:
                 self.place(q[row])
                 placed = row
             value = self.distance(pair, bound)
+            if travelled is not None:
+                until[pair] = passed + value - margin
             if value < margin:
                 if decide[pair]:
                     found[row], met = True, row

@@ -16,7 +16,6 @@ from selfmotion.model.follow.follow import BoundTaskFrame, Follow
 from selfmotion.model.follow.virtual_joints import NO_VIRTUAL_JOINTS, VirtualJoints
 from selfmotion.model.path import Path
 from selfmotion.model.robot import Chain, RobotModel, null_space
-from selfmotion.model.robot.tree_arrays import JOINT
 from selfmotion.model.task import Task
 
 
@@ -184,10 +183,14 @@ def every_column(follows: Follows, q: Array) -> tuple[Array, Ints] | None:
     """
     if not any(item.chain.is_coupled for item in follows.items):
         return None
-    tables = [item.chain.table for item in follows.items]
-    coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
+    if len(follows.items) == 1:
+        chain = follows.items[0].chain
+        return chain.every_along(q)[:, None], np.array(
+            [np.arange(len(chain.coordinates)), chain.coordinates]
+        )
+    coordinates = [item.chain.coordinates for item in follows.items]
     ends = np.cumsum([0, *map(len, coordinates)])
-    columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))
+    columns = np.zeros((len(q), len(follows.items), 6, int(ends[-1])))
     orders = []
     for f, item in enumerate(follows.items):
         own = slice(int(ends[f]), int(ends[f + 1]))

@@ -237,8 +237,8 @@ class Trajectory:
         return {}
 
     def _extremes_of(self, order: int) -> tuple[Array, Array]:
-        n = len(self.joint_names)
-        t = np.full((2, n), self.t[0])
+        joints = np.arange(len(self.joint_names))
+        t = np.full((2, len(joints)), self.t[0])
         values = np.tile(self._spline.segments(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
         for k in self._spline.chunks():
             segments = self._spline.segments(k, order)
@@ -246,19 +246,19 @@ class Trajectory:
             least = np.minimum(ends.min(axis=(0, 1)), values[0])
             largest = np.maximum(ends.max(axis=(0, 1)), values[1])
             # Inner extrema only where the Bernstein hull of a polynomial exceeds all ends.
-            some, joints = np.nonzero(may_pass(segments, least, largest))
-            chosen = segments[:, some, joints]
+            some, of = np.nonzero(may_pass(segments, least, largest))
+            chosen = segments[:, some, of]
             roots = inner_roots(differentiated(chosen))
-            inner = evaluated(chosen, roots)
-            steps = self.t[k + 1] - self.t[k]
-            within = self.t[k][some] + steps[some] * roots
-            for joint in range(n):
-                here = joints == joint
-                when = [t[:, joint], self.t[k], self.t[k + 1], within[:, here].ravel()]
-                each = [values[:, joint], *ends[:, :, joint], inner[:, here].ravel()]
-                times, found = np.concatenate(when), np.concatenate(each)
-                both = [int(np.argmin(found)), int(np.argmax(found))]
-                t[:, joint], values[:, joint] = times[both], found[both]
+            # Elsewhere the start again.
+            inner = np.tile(ends[0], (len(roots), 1, 1))
+            within = np.tile(self.t[k][:, None], (len(roots), 1, len(joints)))
+            inner[:, some, of] = evaluated(chosen, roots)
+            within[:, some, of] += (self.t[k + 1] - self.t[k])[some] * roots
+            found = np.concatenate([values, *ends, *inner])
+            when = np.broadcast_to(np.stack([self.t[k], self.t[k + 1]])[:, :, None], ends.shape)
+            times = np.concatenate([t, *when, *within])
+            both = np.stack([found.argmin(axis=0), found.argmax(axis=0)])
+            t, values = times[both, joints], found[both, joints]
         return read_only(t), read_only(values)
 
     def acceleration_jumps(self) -> tuple[Array, Array]:

@@ -281,18 +281,29 @@ class Chain:
         """Whether joints of the chain share a coordinate."""
         return len(self.joints) < len(self.table) - 1
 
+    @cached_property
+    def coordinates(self) -> Ints:
+        """The coordinate of each joint of the chain, (c,)."""
+        return self.table[:-1, JOINT, 0].astype(np.int64)
+
     def every_along(self, q: Array) -> Array:
         """Return the tip's Jacobian by each joint of the chain at q (K, n), (K, 6, c).
 
         Each times its scale, so that those of a coordinate add up to its column.
         """
-        table = self.table.copy()
-        own, count = table[:-1, JOINT, 0].astype(np.int64), len(table) - 1
-        table[:-1, JOINT, 0] = np.arange(count)
+        count = len(self.coordinates)
         jacobians = np.zeros((len(q), 1, 6, count))
         rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
-        place_along(np.array(q[:, own]), table[None], jacobians, rotations, translations)
+        own = np.ascontiguousarray(q[:, self.coordinates])
+        place_along(own, self._uncoupled, jacobians, rotations, translations)
         return jacobians[:, 0]
+
+    @cached_property
+    def _uncoupled(self) -> Array:
+        """Its table where each joint has a coordinate of its own, (1, c + 1, 6, 3)."""
+        table = self.table.copy()
+        table[:-1, JOINT, 0] = np.arange(len(table) - 1)
+        return table[None]
 
     @cached_property
     def signs(self) -> Array:

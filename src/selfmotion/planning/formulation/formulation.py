@@ -38,7 +38,7 @@ from selfmotion.problem.constraints import (
     JointPositionLimits,
     JointVelocityLimits,
 )
-from selfmotion.problem.costs import Cost, Samples
+from selfmotion.problem.costs import Cost, JointVelocity, Samples
 from selfmotion.problem.problem import Problem, given_end, length_of, smooth_knots
 
 
@@ -179,6 +179,26 @@ class Formulation:
     def knots(self) -> Array:
         """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
         return smooth_knots(self.problem.follows, self.problem.relaxations)
+
+    @cached_property
+    def highest_order(self) -> int:
+        """Order of the highest derivative of q that costs are quadratic forms of; 0 for none."""
+        dof = self.robot.dof
+        return max((order for cost in self.costs for order in cost.curvature(dof)), default=0)
+
+    @cached_property
+    def speed_weights(self) -> Array:
+        """Weights of squared speeds of the arm's joints, (n,).
+
+        The usual ones, scaled to those of the costs: the optimum is independent of the unit of the
+        cost.
+        """
+        arm = self.robot
+        found = np.zeros(arm.dof)
+        found[:] = np.asarray(JointVelocity.usual(arm).weight)
+        own = [cost.curvature(arm.dof).get(1) for cost in self.costs]
+        total = sum(float(np.trace(each)) for each in own if each is not None)
+        return read_only(found * (total / float(found.sum())) if total > 0.0 else found)
 
     @cached_property
     def length_in_reaches(self) -> float:

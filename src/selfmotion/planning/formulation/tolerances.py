@@ -18,7 +18,6 @@ from selfmotion.problem.constraints import (
     BoundQuantity,
     Conditions,
     DependsOn,
-    NodeTangents,
     motion_of_order,
 )
 from selfmotion.problem.costs import Samples
@@ -73,9 +72,10 @@ class WithinBand(BoundQuantity):
         return found
 
     @override
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        found = super().tangents(samples, motion)
-        found[self._outside(samples)] = 0.0
+    def _slopes(self, samples: Samples) -> tuple[Array, ...]:
+        found = super()._slopes(samples)
+        for by in found:
+            by[self._outside(samples)] = 0.0
         return found
 
 
@@ -218,13 +218,23 @@ def _after(more: int, by: Array) -> Array:
 def _band(item: Relaxation, virtual: VirtualJoints) -> Quantity:
     """Return how far rows are off the path, of δ: one number, or the length of several."""
     several = len(item.rows) > 1
+    # The last one: values, slopes and curvature are asked for at the same motion.
+    known: list[tuple[Array, tuple[Array, Array]]] = []
+
+    def rows_of(s: Array) -> tuple[Array, Array]:
+        for at, found in known:
+            if np.array_equal(at, s):
+                return found
+        found = virtual.rows_of(item, s)
+        known[:] = [(s.copy(), found)]
+        return found
 
     def values(s: Array, *rates: Array) -> Array:
-        rows = virtual.rows_of(item, s)[0]
+        rows = rows_of(s)[0]
         return rows[:, None, :] if several else rows
 
     def derivatives(s: Array, *rates: Array) -> tuple[Array, ...]:
-        by = virtual.rows_of(item, s)[1]
+        by = rows_of(s)[1]
         return (by[:, None] if several else by,)
 
     label, unit = f"deviation {item.label}", "rad" if item.angular else "m"

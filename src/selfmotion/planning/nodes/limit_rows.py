@@ -70,19 +70,17 @@ class ControlPointRows:
         rates, table = self._spline.rates(item.order), AT_CONTROLS[item.order]
         return _beyond(changes, table, rates, self.joints, none, none, item.scale, 0.0)
 
-    def pulled(self, multipliers: Array) -> Array:
-        """Return Σ multipliers ∂h/∂y of its joints, (N, 6, j)."""
+    def add_pulled(self, found: Array, multipliers: Array) -> None:
+        """Add Σ multipliers ∂h/∂y to that of all rows, (N, 6, n)."""
         order = self.item.order
-        rates = self._spline.rates(order)
-        return _pulled(
-            np.ascontiguousarray(multipliers), AT_CONTROLS[order], rates, self.item.scale
-        )
+        given = AT_CONTROLS[order], self._spline.rates(order), self.joints, self.item.scale
+        _add_pulled(np.ascontiguousarray(multipliers), *given, found)
 
-    def squared(self, weights: Array) -> Array:
-        """Return Σ weights ∂h ∂hᵀ by y of each of its joints, (N, j, 6, 6)."""
+    def add_squared(self, found: Array, weights: Array) -> None:
+        """Add Σ weights ∂h ∂hᵀ by y of each of its joints to that of all, (N, n, 6, 6)."""
         order = self.item.order
-        rates = self._spline.rates(order)
-        return _squared(np.ascontiguousarray(weights), AT_CONTROLS[order], rates, self.item.scale)
+        given = AT_CONTROLS[order], self._spline.rates(order), self.joints, self.item.scale
+        _add_squared(np.ascontiguousarray(weights), *given, found)
 
     def multipliers_of(self, multipliers: Array, ends: Array) -> Multipliers:
         """Return the multipliers in the order of time."""
@@ -161,10 +159,11 @@ def _beyond(
 
 
 @kernel
-def _pulled(multipliers: Array, table: Array, rates: Array, scale: Array) -> Array:
-    """Return Σ multipliers (N, P, 2, j) ∂h/∂y, (N, 6, j)."""
+def _add_pulled(
+    multipliers: Array, table: Array, rates: Array, joints: Ints, scale: Array, found: Array
+) -> None:
+    """Add Σ multipliers (N, P, 2, j) ∂h/∂y to `found` (N, 6, n)."""
     count, places, _, size = multipliers.shape
-    found = np.zeros((count, 6, size))
     for k in range(count):
         for p in range(places):
             for j in range(size):
@@ -172,15 +171,15 @@ def _pulled(multipliers: Array, table: Array, rates: Array, scale: Array) -> Arr
                 if by != 0.0:
                     by *= rates[k] / scale[j]
                     for a in range(6):
-                        found[k, a, j] += table[p, a] * by
-    return found
+                        found[k, a, joints[j]] += table[p, a] * by
 
 
 @kernel
-def _squared(weights: Array, table: Array, rates: Array, scale: Array) -> Array:
-    """Return Σ weights (N, P, 2, j) ∂h ∂hᵀ by y of each joint, (N, j, 6, 6)."""
+def _add_squared(
+    weights: Array, table: Array, rates: Array, joints: Ints, scale: Array, found: Array
+) -> None:
+    """Add Σ weights (N, P, 2, j) ∂h ∂hᵀ by y of each joint to `found` (N, n, 6, 6)."""
     count, places, _, size = weights.shape
-    found = np.zeros((count, size, 6, 6))
     for k in range(count):
         for p in range(places):
             for j in range(size):
@@ -188,6 +187,6 @@ def _squared(weights: Array, table: Array, rates: Array, scale: Array) -> Array:
                 if by != 0.0:
                     by *= (rates[k] / scale[j]) ** 2
                     for a in range(6):
+                        share = by * table[p, a]
                         for b in range(6):
-                            found[k, j, a, b] += by * table[p, a] * table[p, b]
-    return found
+                            found[k, joints[j], a, b] += share * table[p, b]

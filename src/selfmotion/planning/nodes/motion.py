@@ -93,12 +93,14 @@ class NodeGrid:
             resting = [rest >= order for rest in formulation.problem.rest_orders]
             ends = np.array([0, len(t) - 1])[np.array(resting)]
             self._resting.append((ends + first[:, None]).ravel())
-        held: list[Ints] = [] if free else [np.arange(r)]
+        each = np.arange(r)
+        held: list[Ints] = [] if free else [each]
         for order, nodes in enumerate(self._resting, 1):
-            held += [3 * r * node + order * r + np.arange(r) for node in nodes]
-        for node, count in enumerate(self.manifolds.held.sum(axis=1)):
-            last = 3 * r * node + np.arange(r - count, r)
-            held += [last, last + r, last + 2 * r] if count else []
+            held.append((3 * r * nodes[:, None] + order * r + each).ravel())
+        counts_held = self.manifolds.held.sum(axis=1)
+        for node in np.flatnonzero(counts_held).tolist():
+            last = 3 * r * node + np.arange(r - counts_held[node], r)
+            held += [last, last + r, last + 2 * r]
         self.held = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
 
     @property

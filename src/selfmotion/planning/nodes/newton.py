@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, Flags, kernel
 from selfmotion.planning.nodes.motion import NodeMotion, moved_along
 from selfmotion.planning.nodes.newton_system import Change, ElasticRows, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
@@ -382,7 +382,13 @@ def _merit(solver: _Solver, motion: NodeMotion, slacks: Array, elastics: Array) 
 
 def _to_boundary(values: Array, step: Array) -> float:
     """Return the largest share of a step, at most 1, by the fraction-to-the-boundary rule."""
-    falling = step < 0.0
-    if not falling.any():
-        return 1.0
-    return min(1.0, float(np.min(SETTINGS.tau * -values[falling] / step[falling])))
+    return _largest_share(values, step, SETTINGS.tau)
+
+
+@kernel
+def _largest_share(values: Array, step: Array, tau: float) -> float:
+    share = 1.0
+    for k in range(len(values)):
+        if step[k] < 0.0:
+            share = min(share, -tau * values[k] / step[k])
+    return share

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from typing_extensions import override
 
-from selfmotion.basics import Array, Flags, Ints, ProblemError
+from selfmotion.basics import Array, Flags, Ints, ProblemError, kernel
 from selfmotion.planning.formulation import SampledMotion
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.spline import ORDERS, Quintic, point_shares
@@ -69,13 +69,11 @@ class PointRows:
 
     def along(self, changes: Array) -> Array:
         """Return the directional derivative of h for changes of y (N, 6, n), (R,)."""
-        return np.asarray(np.sum(self.by_ends * changes[self.intervals], axis=(1, 2)))
+        return _along(self.intervals, self.by_ends, changes)
 
-    def pulled(self, multipliers: Array, count: int) -> Array:
-        """Return the transposed product Σ multipliers ∂h/∂y, (count, 6, n)."""
-        found = np.zeros((count, *self.by_ends.shape[1:]))
-        np.add.at(found, self.intervals, multipliers[:, None, None] * self.by_ends)
-        return found
+    def add_pulled(self, found: Array, multipliers: Array) -> None:
+        """Add the transposed product Σ multipliers ∂h/∂y to that of all rows, (N, 6, n)."""
+        _add_pulled(self.intervals, self.by_ends, np.ascontiguousarray(multipliers), found)
 
     def add_squared(self, matrix: NodeMatrix, by: EndChanges, weights: Array) -> None:
         """Add Σ weights ∂h ∂hᵀ by the coordinates of all nodes."""
@@ -194,3 +192,24 @@ class CollocationRows:
         right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
         right -= t - known[right - 1] < known[right] - t
         return np.asarray(multipliers[right] * (len(known) / len(t)))
+
+
+@kernel
+def _add_pulled(intervals: Ints, by_ends: Array, multipliers: Array, found: Array) -> None:
+    """Add Σ multipliers (R,) ∂h/∂y (R, 6, n) to those of the intervals, (N, 6, n)."""
+    _, ends, n = by_ends.shape
+    for i in range(len(intervals)):
+        for a in range(ends):
+            for j in range(n):
+                found[intervals[i], a, j] += multipliers[i] * by_ends[i, a, j]
+
+
+@kernel
+def _along(intervals: Ints, by_ends: Array, changes: Array) -> Array:
+    """Return Σ ∂h/∂y (R, 6, n) · changes (N, 6, n) of the rows, (R,)."""
+    (count, ends, n), found = by_ends.shape, np.zeros(len(intervals))
+    for i in range(count):
+        for a in range(ends):
+            for j in range(n):
+                found[i] += by_ends[i, a, j] * changes[intervals[i], a, j]
+    return found

@@ -254,9 +254,9 @@ class LinearRows:
         of_limits, of_points = self.rows.by_kind(multipliers)
         for limits, own in zip(self.rows.limits, of_limits, strict=True):
             if own.any():
-                found[:, :, limits.joints] += limits.pulled(own)
+                limits.add_pulled(found, own)
         for points, own, active in zip(self.points, of_points, self._active[1], strict=True):
-            found += points.pulled(own[active], count)
+            points.add_pulled(found, own[active])
         return found
 
     def add_squared(self, matrix: NodeMatrix, by: EndChanges, weights: Array) -> None:
@@ -267,7 +267,7 @@ class LinearRows:
             if own.any():
                 if forms is None:
                     forms = np.zeros((self.rows.spline.count, self.rows.dof, 6, 6))
-                forms[:, limits.joints] += limits.squared(own)
+                limits.add_squared(forms, own)
         if forms is not None:
             matrix.add_joint_forms(by, forms)
         for points, own, active in zip(self.points, of_points, self._active[1], strict=True):

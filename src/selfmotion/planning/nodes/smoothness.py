@@ -8,7 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import window_edges
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.spline import Quintic
-from selfmotion.problem.costs import JointVelocity, Samples
+from selfmotion.problem.costs import Samples
 
 # Time in which the self-motion of a resting arm starts and stops, as a share of the duration.
 _STARTING = 0.02
@@ -68,7 +68,7 @@ def smoothing_of(
     if not shares.any():
         return None
     each = {order: b for order, b in ((2, shares), (3, of_jerks)) if b.any()}
-    return Smoothing(each, np.diag(_weights(formulation)))
+    return Smoothing(each, np.diag(formulation.speed_weights))
 
 
 def rest_times(formulation: Formulation) -> Array:
@@ -85,7 +85,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
     if _is_smooth(formulation) or not any(formulation.problem.rest_orders):
         return quick
     shares = _of_rest(formulation, samples.sampling.t, quick)
-    squares = shares * (samples.qdd**2 @ _weights(formulation))
+    squares = shares * (samples.qdd**2 @ formulation.speed_weights)
     added = 0.5 * float(np.sum(samples.weights * squares))
     if added <= _TOO_MUCH * abs(cost):
         return quick
@@ -94,10 +94,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
 
 def _is_smooth(formulation: Formulation) -> bool:
     """Whether the costs penalise q̈ or the jerk themselves."""
-    orders = [
-        order for cost in formulation.costs for order in cost.curvature(formulation.robot.dof)
-    ]
-    return max(orders, default=0) > 1
+    return formulation.highest_order > 1
 
 
 def _of_rest(formulation: Formulation, t: Array, quick: float) -> Array:
@@ -128,20 +125,6 @@ def _faded(away: Array, starting: float) -> Array:
 
 def can_be_smoothed(formulation: Formulation, samples: Samples, cost: float) -> bool:
     """Return whether q̈ may be penalised everywhere at this cost, see `smoothing_of`."""
-    squares = samples.qdd**2 @ _weights(formulation)
+    squares = samples.qdd**2 @ formulation.speed_weights
     share = (_EVERYWHERE * formulation.path.duration) ** 2
     return bool(0.5 * share * float(samples.weights @ squares) <= _LITTLE * abs(cost))
-
-
-def _weights(formulation: Formulation) -> Array:
-    """Return the weights of squared rates of the arm's joints, (n,).
-
-    The usual weights of joint speed, scaled to those of the costs: the optimum is independent of
-    the unit of the cost.
-    """
-    arm = formulation.robot
-    found = np.zeros(arm.dof)
-    found[:] = np.asarray(JointVelocity.usual(arm).weight)
-    own = [cost.curvature(arm.dof).get(1) for cost in formulation.costs]
-    total = sum(float(np.trace(each)) for each in own if each is not None)
-    return found * (total / float(found.sum())) if total > 0.0 else found

@@ -177,7 +177,13 @@ class Quintic:
 
     def rates(self, order: int) -> Array:
         """Return h^-o, (N,)."""
-        return np.asarray(self.steps ** float(-order))
+        if order not in self._rates:
+            self._rates[order] = np.asarray(self.steps ** float(-order))
+        return self._rates[order]
+
+    @cached_property
+    def _rates(self) -> dict[int, Array]:
+        return {}
 
     def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
         """Return a derivative at shares of all intervals, (N, S, n), for their U_o and y."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from typing_extensions import override
@@ -252,15 +252,25 @@ class BoundQuantity(BoundConstraint):
 
     @override
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        slopes = self._slopes(samples)
+        every = (np.einsum("kmj,kjd->kmd", by, motion.of_order(k)) for k, by in enumerate(slopes))
+        return np.asarray(sum(every))
+
+    @override
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], Linear]:
+        slopes = self._slopes(samples)
+        rows, columns, _ = slopes[0].shape
+        return (rows, columns), _ByMotion(slopes)
+
+    def _slopes(self, samples: Samples) -> tuple[Array, ...]:
+        """Return ∂h by q, and by q̇ and q̈ where it depends on these, (N + 1, C, n) each."""
         changes = self.quantity.derivatives(*motion_at_nodes(samples))
         some, limit = self.quantity.limited, self._limit
-        pairs = zip(changes, (motion.of_order(k) for k in range(3)), strict=False)
-        by = np.asarray(sum(np.einsum("k...j,kjd->k...d", part[:, some], x) for part, x in pairs))
         if self.quantity.components == 1:
-            above = by / limit[:, None]
-            return np.concatenate([above, -above], axis=1)
-        by /= limit[:, None, None]
-        return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
+            above = [part[:, some] / limit[:, None] for part in changes]
+            return tuple(np.concatenate([part, -part], axis=1) for part in above)
+        share = 2.0 * self._used(samples) / limit[:, None]
+        return tuple(np.einsum("kmc,kmcj->kmj", share, part[:, some]) for part in changes)
 
     @override
     def uses_accelerations(self, dof: int) -> bool:
@@ -305,6 +315,18 @@ class BoundQuantity(BoundConstraint):
         """Return shares of limits at the nodes, (N + 1, m) or of vectors (N + 1, m, c)."""
         away = self.quantity.away(*motion_at_nodes(samples))[:, self.quantity.limited]
         return np.asarray(away / (self._limit if away.ndim == 2 else self._limit[:, None]))
+
+
+class _ByMotion(NamedTuple):
+    """Derivatives of a quantity's conditions, by those of h by q, q̇ and q̈, (N + 1, C, n) each."""
+
+    slopes: tuple[Array, ...]
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        found = np.zeros((len(rows), motion.size))
+        for order, by in enumerate(self.slopes):
+            found += np.einsum("kj,kjd->kd", by[rows, columns], motion.of_order(order)[rows])
+        return found
 
 
 # Weight of a violation, squared and integrated, at which a constraint counts as ten times the cost.
