@@ -91,7 +91,7 @@ def test_kinematics_load_without_meshes_and_messages_name_them(
     expected = load(tmp_path, SOUND).pose(Q)
     blind = load(tmp_path, with_mesh("collision", file))
     np.testing.assert_array_equal(blind.pose(Q).homogeneous, expected.homogeneous)
-    said = rf"link 'upper': .*{reason}.*{Path(file).name}; or .*--no-self-collision"
+    said = rf"link 'upper': .*{reason}.*{Path(file).name}; or .*--set clearance=false"
     with pytest.raises(sm.errors.RobotError, match=said):
         sm.obstacles.CollisionModel(blind)
     undrawn = load(tmp_path, with_mesh("visual", file))
