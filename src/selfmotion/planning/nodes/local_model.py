@@ -1,13 +1,12 @@
 """Derivatives of the nodes by their coordinates w = (z, ν, α), to second order, compiled.
 
-First derivatives by ν and α are exact; those by z, and all second ones, are differences along the
-manifold: central ones, but forward ones by two coordinates of z. The neighbours of a node are
-placed on its manifold to second order,
+First derivatives by ν and α are exact; those by z, and all second ones, are central differences
+along the manifold. The neighbours of a node are placed on its manifold to second order,
 
     q(z) = q_ref + T z - ½ J⁺ Q(T z, T z),   with J̇q̇ = Q(q̇, q̇),
 
 so that each takes one pass over the joints. What is left is odd in z to third order: it cancels in
-central differences, and is within the error of the others.
+second differences, and is within the error of first ones.
 """
 
 from dataclasses import dataclass
@@ -46,9 +45,9 @@ from selfmotion.planning.nodes.kernels import (
     turned,
 )
 
-# Step of differences along a manifold [rad or m]: first derivatives are right to 1e-9, second ones
-# to 1e-6, those by two coordinates to 3e-5.
-_REACH = 3e-5
+# Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
+# second ones to 1e-6.
+_REACH = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,7 @@ class LocalModel:
         own, table = charts.manifolds, place.table
         (count, n, r), layout, follows = charts.bases.shape, own.layout, own.follows
         directions = _directions(r)
-        q = np.empty((len(directions), count, n))
+        q = np.empty((2 * len(directions), count, n))
         bases, here = np.ascontiguousarray(charts.bases), every_column(follows, place.q)
         neighbours(table, layout, here, bases, directions, _REACH, q)
         there = every_column(follows, q.reshape(-1, n)) if here is not None else None
@@ -113,11 +112,10 @@ class LocalModel:
 
 @cache
 def _directions(r: int) -> Array:
-    """Return the directions of neighbours, (D, r): along and against axes; sums of two of them."""
+    """Return the directions of differences, (D, r): the axes, then the sums of two of them."""
     axes = np.eye(r)
     x, y = np.tril_indices(r, -1)
-    both = np.stack([axes, -axes], axis=1).reshape(2 * r, r)
-    return np.concatenate([both, axes[x] + axes[y]])
+    return np.concatenate([axes, axes[x] + axes[y]])
 
 
 class _Work(NamedTuple):
@@ -193,9 +191,9 @@ def neighbours(
     reach: float,
     q: Array,
 ) -> None:
-    """Set q (D, K, n) of all nodes displaced along directions (D, r), by `reach` times each.
+    """Set q (2 D, K, n) of all nodes displaced along directions (D, r) and against them.
 
-    On the manifold to second order.
+    By ± `reach` times each, on the manifold to second order.
     """
     (count, n, r), m = bases.shape, rows_of(layout)
     along, bend, six, right = np.empty(n), np.empty(n), np.empty(6), np.empty(m)
@@ -214,7 +212,9 @@ def neighbours(
                 select(layout, f, tip.rotation, six, right)
             project(at.task_jacobian, at.factor, right, bend, bend)
             for j in range(n):
-                q[d, k, j] = at.q[j] + reach * along[j] + 0.5 * reach * reach * bend[j]
+                even = at.q[j] + 0.5 * reach * reach * bend[j]
+                q[2 * d, k, j] = even + reach * along[j]
+                q[2 * d + 1, k, j] = even - reach * along[j]
 
 
 @kernel
@@ -261,7 +261,7 @@ def differences(
             work.row[i] = table[k, i]
         sound = True
         for d in range(q.shape[0]):
-            axis, s = d // 2 if d < 2 * r else r, d * count + k
+            axis, s = d // 2, d * count + k
             sound = _place(view(q[d, k], 0, (n,)), layout, chains, held[k], epsilon, work)
             if not sound:
                 break
@@ -400,15 +400,15 @@ def _set_all(gamma: Array, curved: Array, value: float) -> None:
 
 @inlined
 def _set_second(curved: Array, values: Array, middle: float, reach: float, r: int) -> None:
-    """Set the second derivatives by z: central differences, and forward ones of two coordinates."""
+    """Set the second derivatives by z: differences along the axes, then along sums of two."""
     for x in range(r):
         curved[x, x] = (values[2 * x] - 2.0 * middle + values[2 * x + 1]) / reach**2
     d = 2 * r
     for x in range(r):
         for y in range(x):
-            both = values[d] - values[2 * x] - values[2 * y] + middle
-            curved[x, y] = curved[y, x] = both / reach**2
-            d += 1
+            both = (values[d] - 2.0 * middle + values[d + 1]) / reach**2
+            curved[x, y] = curved[y, x] = 0.5 * (both - curved[x, x] - curved[y, y])
+            d += 2
 
 
 @called
@@ -452,7 +452,7 @@ def _call_what_follows() -> None:
     bases, held, given = np.zeros((0, 2, 1)), np.zeros((0, 2), dtype=np.bool_), np.zeros((0, 6))
     one, three = np.zeros((0, 1)), np.zeros((0, 3, 2))
     accelerate(table, layout, None, given, rates, rates)
-    neighbours(table, layout, None, bases, np.array([[1.0], [-1.0]]), _REACH, np.zeros((2, 0, 2)))
+    neighbours(table, layout, None, bases, np.eye(1), _REACH, np.zeros((2, 0, 2)))
     differences(
         np.zeros((2, 0, 2)),
         table,
