@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check quick test test-site test-baseline lint format bench short wheel docs errors three clean
+.PHONY: help demo check quick test test-site test-baseline lint style format bench short wheel docs errors three clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -26,7 +26,7 @@ test-site: $(READY)  ## long tests: the site, pages in a browser, the study of t
 	$(BIN)/pytest $(TWO) $(BY_FILE) -m site
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
-	$(MAKE) --jobs 2 --output-sync lint quick
+	$(MAKE) --jobs 2 --output-sync style quick
 
 quick: $(READY)
 	$(BIN)/pytest $(TWO) --dist worksteal -m 'not site' --below 0.1 --arms few
@@ -39,12 +39,14 @@ PLANNING := $(addprefix tests/, baselines batch certificate collision constraint
 test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
 	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest $(TWO) $(BY_FILE) $(PLANNING)
 
-lint: $(READY)  ## style, types and layers
+lint: style  ## style, types, layers and words
+	$(BIN)/pytest tests/docs/test_words.py
+
+style: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest tests/docs/test_words.py
 
 format: $(READY)  ## fixes of style that need no thought
 	$(BIN)/ruff check --fix .
