@@ -263,3 +263,28 @@ def test_an_arm_without_a_joint_to_spare_is_judged_all_the_same(tmp_path: Path) 
         assert found == code, said
         assert json.loads(said)["rotation_error"]["value"] > 1e-9
     assert "joints" in complaint("plan", "ur5", "--path", tmp_path / "b.csv")
+
+
+@pytest.mark.parametrize("key", ["tolerance.position=1e-12", "search.starts=3", "goal=fastest"])
+def test_what_says_how_to_plan_is_refused_of_a_motion_that_is_there(
+    plan: Path, tmp_path: Path, key: str
+) -> None:
+    """It would be told as verified, by a tolerance that it does not keep."""
+    motion = tmp_path / "m.csv"
+    sm.files.write_motion(sm.load_plan(plan), motion)
+    name = key.partition("=")[0]
+    for options in ([plan], [motion, "--robot", plan]):
+        assert f"--set {name}: says how to plan" in complaint("check", *options, "--set", key)
+
+
+def test_a_motion_of_a_problem_file_is_judged_by_the_tolerance_that_is_set(
+    plan: Path, tmp_path: Path
+) -> None:
+    motion, problem = tmp_path / "m.csv", tmp_path / "cell.toml"
+    sm.files.write_motion(sm.load_plan(plan), motion)
+    sm.files.write_problem(sm.load_plan(plan).problem, problem)
+    assert invoke("check", motion, "--robot", problem)[0] == 0
+    assert invoke("check", motion, "--robot", problem, "--set", "tolerance.position=1e-12")[0] == 1
+    assert "says how to plan" in complaint(
+        "check", motion, "--robot", problem, "--set", "max_evaluations=3"
+    )

@@ -88,6 +88,10 @@ class Said:
         return {"set": self.settings, **{name: getattr(self, name) for name in names}}
 
 
+# Keys of a problem file that say how to plan, and nothing of the motion.
+HOW_TO_PLAN = (
+    *("goal", "keep", "parts", "search", "optimiser", "tolerance", "max_evaluations", "outputs"),
+)
 # Starts that have a name, as in problem files.
 _STARTS = ("home", "dexterous", "free")
 # Tool motions that may begin where the arm does.
@@ -159,12 +163,34 @@ def problem_of(file: Path, said: Said, allow_code: bool = False) -> sm.Problem:
 
 
 def changed(problem: sm.Problem, said: Said) -> sm.Problem:
-    """Return a problem with keys of its file set otherwise; the same one where nothing is said."""
+    """Return a problem with keys of its file set otherwise; the same one where nothing is said.
+
+    Raises
+    ------
+    ProblemError
+        A key says how to plan, or the problem is none with it.
+    """
     if not any(said.typed.values()):
         return problem
+    refuse_how_to_plan(said)
     document = problem_document(problem, Path("problem.toml"))
     said.set_in(document, Path())
     return plan_request_of(document).problem
+
+
+def refuse_how_to_plan(said: Said, besides: str = "") -> None:
+    """Raise ProblemError for a key that says how to plan a motion that is there.
+
+    All but `besides`, a key that has an effect.
+    """
+    for text in said.settings or ():
+        key, _ = parse_setting(text)
+        part = key.partition(".")[0]
+        if part in HOW_TO_PLAN and part != besides:
+            raise sm.errors.ProblemError(
+                f"--set {key}: says how to plan, and this motion is there already: leave it out "
+                f"(what check allows: --tolerance, --turn)"
+            )
 
 
 def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:

@@ -118,6 +118,8 @@ class Asked:
             plan = sm.load_plan(self.robot, progress=progress)
             problem, ending = documents.changed(plan.problem, self.said), plan.report.ending
             return checks.Wanted(problem, plan.tolerance, ending, plan, said=self.said)
+        # A file's tolerance is what its motion is judged by.
+        documents.refuse_how_to_plan(self.said, besides="tolerance")
         task = None
         try:
             request = documents.read(self.robot, self.said, usual=_OF_OTHERS)

@@ -37,10 +37,7 @@ if TYPE_CHECKING:
     from selfmotion.work.batch import Item
 
 # Keys of problem files that are about a whole plan.
-_OF_PLANS = (
-    *("null_motion", "rest", "goal", "keep", "parts", "search", "optimiser", "tolerance"),
-    *("max_evaluations", "outputs"),
-)
+_OF_PLANS = ("null_motion", "rest", *documents.HOW_TO_PLAN)
 
 
 def panda_past_a_box() -> sm.Problem:
