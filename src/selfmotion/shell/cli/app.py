@@ -33,10 +33,6 @@ from selfmotion.shell.cli.summaries import in_shell
 if TYPE_CHECKING:
     from selfmotion.work.batch import BatchProgress
 
-# Which stage is running, and how far a batch is.
-
-# Which stage is running: a bar on a terminal, a line per stage in a log.
-
 # Of shorter stages it is not said how long they will last [s].
 _WORTH_SAYING = 2.0
 # A log has a line at least this often [s], which is looked at in between.
@@ -190,9 +186,6 @@ class StageDisplay(Display):
                 self._print(self._line())
 
 
-# How far a batch is, and where it runs.
-
-
 class BatchDisplay(Display):
     """A bar with rate and time left on a terminal, a line per tenth in a log."""
 
@@ -246,8 +239,6 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
     with client:
         yield client.get_executor()
 
-
-# The command line: where commands are registered, and how they end.
 
 # Under which commands are listed.
 PLAN, LOOK, FILES = "Plan", "Inspect plans", "Files"

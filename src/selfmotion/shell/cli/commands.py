@@ -351,9 +351,6 @@ def _check_map(file: Path, plans: list[Path]) -> None:
         raise sm.errors.RenderError("--map: a redundancy map is of one plan")
 
 
-# The command that changes how fast motions are.
-
-
 @app.command(
     epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz",
     rich_help_panel=PLAN,

@@ -20,8 +20,6 @@ from selfmotion.basics import Array
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import reachable
 
-# What `selfmotion follow` does: states of an arm come by UDP, and segments go back.
-
 # Largest size of a UDP datagram [bytes].
 _LARGEST_DATAGRAM = 65_507
 # Time-out of a receive [s].

@@ -24,8 +24,6 @@ from selfmotion.shell.cli.app import (
     terminal,
 )
 
-# The commands that say how wrong a cell may be.
-
 
 @app.command(
     epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK

@@ -234,16 +234,16 @@ CenterOption = Annotated[
 
 
 def numbers(text: str, option: str, count: int | None = None) -> Array:
-    """Return the numbers of an option, so many if a count is given."""
+    """Return the numbers of an option; of a wrong number of them, ProblemError."""
     try:
-        numbers = np.array([float(part) for part in text.split(",")])
+        values = np.array([float(part) for part in text.split(",")])
     except ValueError:
         raise sm.errors.ProblemError(
             f"{option} is '{text}', expected numbers like 0,-0.8,1.6"
         ) from None
-    if count is not None and len(numbers) != count:
-        raise sm.errors.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
-    return numbers
+    if count is not None and len(values) != count:
+        raise sm.errors.ProblemError(f"{option} has {len(values)} numbers, expected {count}")
+    return values
 
 
 def ranges(texts: list[str] | None) -> dict[str, Array]:

@@ -17,8 +17,6 @@ from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages,
 from selfmotion.shell.cli.documents import Said
 from selfmotion.shop import controllers
 
-# Settings of controllers' programs.
-
 
 def program_settings(
     file: Path | None, settings: Sequence[str] | None = None
@@ -37,8 +35,6 @@ def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> 
     if told and asked is not None and isinstance(asked.work_object, SE3):
         stages.print(f"note: {told}", markup=False, soft_wrap=True)
 
-
-# The files that a plan is written to.
 
 # Suffixes of messages that are written as text.
 _TEXT_SUFFIXES = (".yaml", ".yml", ".json")

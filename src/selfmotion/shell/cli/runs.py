@@ -241,9 +241,6 @@ def study(
     terminal.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
 
 
-# The command that compiles all kernels, so that nobody waits for them later.
-
-
 @app.command("warm-up", epilog="Example: selfmotion warm-up", rich_help_panel=BEGIN)
 def warm_up() -> None:
     """Compile all numerical kernels now, once per machine, so that no plan waits for them."""

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from selfmotion.work.batch import Batch
     from selfmotion.work.placement import Placement
 
-# Advice in messages of the library → the same with options of the shell.
-
 # As the library says it → as the shell does, in this order.
 _WORDS = (
     (r"take robot\.inverse_kinematics\(.*?\), task, seed=start\)", "give another --start"),
@@ -65,8 +63,6 @@ def in_shell(message: str) -> str:
         message = re.sub(words, option, message)
     return message
 
-
-# The short form of a result: the verdict, one number, one remedy.
 
 # What else a summary leaves out is said by this.
 _MORE = "--verbose"
@@ -203,9 +199,6 @@ def with_hint(text: str) -> str:
 def _print(console: Console, text: str, style: str | None = None) -> None:
     # One line of a log; words are kept whole on a terminal.
     console.print(text, style=style, markup=False, soft_wrap=not console.is_terminal)
-
-
-# Results as JSON.
 
 
 def batch_json(batch: "Batch") -> dict[str, Any]:

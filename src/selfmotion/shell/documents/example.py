@@ -21,8 +21,6 @@ from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task, rotation_vectors
 from selfmotion.problem.constraints import PositionDependentVelocityLimits
 
-# Initial configurations of examples: those with room for the example's paths.
-
 # Number of random configurations.
 _RANDOM_CONFIGURATIONS = 1000
 # Number of those, least singular first, that are moved along the paths.
@@ -98,8 +96,6 @@ def _room(arm: RobotModel, task: Task, q: Array, positions: Array) -> Array:
         q = np.where(ended[:, None], first, q)
     return least
 
-
-# The problem files that ``selfmotion init`` writes.
 
 _HEAD = """\
 # What to plan: selfmotion {command} {file}

@@ -42,8 +42,6 @@ from selfmotion.shop.cam import read_path
 if TYPE_CHECKING:
     from selfmotion.model.task import SE3
 
-# Classes and functions of a user's own, which a file names as ``module:attribute``.
-
 # The kind of a cost that is a function.
 FUNCTION = "function"
 
@@ -139,8 +137,6 @@ def _code(name: Any, where: str, folder: FilePath, allowed: bool) -> Any:
             f"in {folder} or installed"
         ) from error
 
-
-# Tool motions, obstacles and starts from tables of a problem file.
 
 # Tool motions that may begin where the arm does, and have a feed.
 _SHAPES = ("circle", "line", "spiral")
@@ -347,8 +343,6 @@ def _require_one(values: Mapping[str, Any], *names: str) -> None:
         listed = " and ".join(present) or "neither"
         raise ProblemError(f"has {listed}, expected either {' or '.join(names)}")
 
-
-# A workpiece in a file: a frame, and the paths and bodies that are placed with it.
 
 # Name of its mesh.
 NAME = "workpiece"

@@ -25,8 +25,6 @@ from selfmotion.shell.documents.seam_job import HIGHEST, JOB, OF_PROBLEM, OF_TAB
 from selfmotion.shop.cam import read_path
 from selfmotion.work.job import Seam, plan_job
 
-# What each key of a problem or job file means: as the docstrings of what it is given to say it.
-
 # What a table's keys are given to, where that is no class of its own name.
 _GIVEN_TO: Mapping[str, tuple[Callable[..., Any], ...]] = {
     "Problem": (Problem, plan, PlanRequest),
@@ -173,8 +171,6 @@ def _parameters(source: Callable[..., Any]) -> dict[str, str]:
                     parameters[name.strip()] = " ".join(item.description.split())
     return parameters
 
-
-# The JSON Schema of problem and job files, for editors.
 
 _MOTION = "ToolMotion"
 # Paths that are made of others, and the key of these.

@@ -145,7 +145,7 @@ def _compared(label: str, value: float, start: float | None) -> Fact:
 
 def _remaining(report: Report, certificate: Certificate) -> list[Fact]:
     left = report.remaining
-    # Of a motion that breaks constraints the estimate is of no use: what it saves is not to be had.
+    # Of a motion that breaks constraints the estimate is of no use: that is not saved.
     if left is None or not certificate.verified:
         return []
     share = f"{100 * left / abs(report.cost):.2g} % with any null motion"

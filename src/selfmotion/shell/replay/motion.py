@@ -18,8 +18,6 @@ from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 
-# A plan's motion, sampled for a page: key frames of the links, and curves over time.
-
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
 _TOLERANCE = 5e-5
@@ -235,8 +233,6 @@ def _velocity_ellipsoid(jacobian: Array, task: Task) -> Array:
     return np.asarray((vectors * np.maximum(lengths, 0.02 * lengths[-1])) @ vectors.T)
 
 
-# The closest pair of bodies over time, for a page.
-
 # A distance query costs milliseconds, a hundred times one point of the other curves.
 _POINTS = 121
 
@@ -295,8 +291,6 @@ def clearance_curve(
         np.array(asked),
     )
 
-
-# How the arm can move while its tool stays: for the slider of a page.
 
 # Times of a motion at which the arm is moved along its self-motion; steps to either side of it, and
 # how far the chosen joint turns in each [rad or m].

@@ -200,9 +200,6 @@ def _assemble(
     )
 
 
-# What pages are made of, here and for meshcat.
-
-
 def joined(names: Sequence[str]) -> str:
     """Return scripts of the page as one."""
     return "\n" + "\n".join(web(name) for name in names)

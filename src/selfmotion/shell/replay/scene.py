@@ -26,8 +26,6 @@ from selfmotion.shell.replay.meshes import Json, Payload, read_meshes
 from selfmotion.shell.replay.motion import Curves, KeyFrames
 from selfmotion.shell.replay.three import Indices, Surface
 
-# What stands around the arm: ground, light, camera, and the traces of the tool.
-
 _ROOT = "/selfmotion"
 _PRESCRIBED = (0.55, 0.57, 0.60)
 # three.js: draw only faces seen from behind.
@@ -254,8 +252,6 @@ def ellipsoid_command() -> Json:
         f"{_ROOT}/ellipsoid", three.sphere(1.0), three.ghostly((0.95, 0.55, 0.15), 0.38)
     )
 
-
-# Bodies as commands for the viewer: obstacles, and what of the links may not meet anything.
 
 # Of what stands around, the part that is worked on, and what the arm carries.
 _AROUND, _PART, _CARRIED = (0.80, 0.62, 0.42), (0.47, 0.66, 0.56), (0.36, 0.48, 0.70)

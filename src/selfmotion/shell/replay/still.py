@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# A picture of a plan as SVG: for print, and for where no script runs.
-
 # The arm at these shares of the motion's time, from pale to dark.
 _SHARES = (0.0, 0.5, 1.0)
 _INKS = ("#b9c4d6", "#7f93b5", "#2f4a7d")
@@ -153,8 +151,6 @@ def _hull(points: Array) -> Array:
     except QhullError:
         return points[:1]
 
-
-# The replay's plots as a matplotlib figure.
 
 # Letters of the title in a line, so that it is as wide as the figure at most.
 _TITLE = 120

@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array
 
-# Meshes we draw ourselves: tubes along a path, beads on it, tool triads; and the colour scale.
-
 # Viridis at nine places: perceptually even, readable without colour vision and in grey.
 COLOR_SCALE = (
     "#440154 #472d7b #3b528b #2c728e #21918c #28ae80 #5ec962 #addc30 #fde725".split()  # noqa: SIM905

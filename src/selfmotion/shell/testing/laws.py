@@ -19,8 +19,6 @@ from selfmotion.planning.rollout import MinimumNormMotion
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.problem.problem import Problem
 
-# What all laws are made of: what is required, and how a failure is told.
-
 # Exact gradients against central differences of F, relative to the largest entry.
 GRADIENT = 1e-6
 
@@ -68,8 +66,6 @@ def near(
             f"{miss[worst]:.2e}, allowed {tolerance:.1e})"
         )
 
-
-# The laws, one function for each kind of class.
 
 # Twists against central differences of poses [m/s, rad/s]: their truncation and rounding.
 TWIST = 1e-6

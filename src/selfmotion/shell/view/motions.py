@@ -76,9 +76,6 @@ def _still(robot: RobotModel, q: Array, seconds: float) -> Trajectory:
     return Trajectory(np.array([0.0, seconds]), q, np.zeros_like(q), robot.joint_names)
 
 
-# The same of jobs.
-
-
 def coarse_program(job: SeamJob, before: Program) -> SequenceReplay:
     """Return a program put onto the paths of a job, seam by seam; moves are bent after it."""
     problems = dict(zip((seam.name for seam in job.seams), job.problems, strict=True))

@@ -208,9 +208,6 @@ def _slides(robot: RobotModel, joint: str) -> bool:
     return robot.urdf.joints[joint].kind == "prismatic"
 
 
-# The load that torques were verified with, and the load that a program states.
-
-
 def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange: str) -> list[Load]:
     """Return the load at the flange in each constraint of torques, by payload and URDF."""
     held = [item.load for item in constraints if item.load is not None]
