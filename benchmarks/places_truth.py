@@ -15,6 +15,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.problem.problem import envelope_of_problem
 
 # Poses along the path, random seeds at each, and of these at poses where none of them led there.
 POSES, SEEDS, MORE_SEEDS = 61, 300, 6000
@@ -130,7 +131,7 @@ class _Asked:
 
     def free(self, q: Array) -> Array:
         """Return those of q (K, n) that keep all bodies apart."""
-        for model, distance in self.problem.envelope.bodies:
+        for model, distance in envelope_of_problem(self.problem).bodies:
             q = q[~model.colliding(q, distance)] if len(q) else q
         return q
 
@@ -153,7 +154,7 @@ def truth_of(problem: sm.Problem, seed: int = 0) -> Truth:
             return Truth.NO_POSE
         layers.append((k, found))
     ordered = [layer for _, layer in sorted(layers, key=lambda pair: pair[0])]
-    steps = problem.envelope.speed * np.diff(times)[0]
+    steps = envelope_of_problem(problem).speed * np.diff(times)[0]
     return Truth.MOTION if _chain(asked, times, ordered, steps) else Truth.NO_CHAIN
 
 

@@ -24,6 +24,7 @@ from suite import DATA, PathProblem, load, plan
 
 import selfmotion as sm
 from selfmotion.basics import Array, Flags, Ints, silent
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.result import Reason, RedundancyMap
 from selfmotion.shell.cli.tables import console
 
@@ -121,7 +122,7 @@ def compared(problem: PathProblem, columns: int, rows: int, starts: int, seed: i
 
 def by_brute_force(found: sm.Plan, shown: RedundancyMap, problem: PathProblem, starts: int) -> Ints:
     """Return what stops the arm at each pixel, as brute force has it, (N, M)."""
-    model, required = found.problem.envelope.bodies[0]
+    model, required = envelope_of_problem(found.problem).bodies[0]
     own = found.trajectory(shown.times)
     oracle = Oracle(found.problem, shown, own, (), (), required, starts)
     if shown.redundancy == 1 and problem.robot.reference is None:

@@ -9,7 +9,7 @@ from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation, path_errors
 from selfmotion.planning.nodes import NodeGrid, broken_intervals, forget
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import moved_along, stepped
+from selfmotion.planning.nodes.motion import hermite_accelerations, moved_along, stepped
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
@@ -119,7 +119,7 @@ def test_accelerations_of_cubics_are_exact(panda: sm.RobotModel) -> None:
                   for k in range(7)], axis=1)
         for order in range(3)
     )  # fmt: skip
-    np.testing.assert_allclose(grid._accelerations(q, qd), qdd, atol=1e-9)
+    np.testing.assert_allclose(hermite_accelerations(grid.spline, len(q), q, qd), qdd, atol=1e-9)
 
 
 def test_rates_of_nodes_change_by_what_a_step_says(panda: sm.RobotModel) -> None:

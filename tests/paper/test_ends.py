@@ -12,6 +12,7 @@ from selfmotion.model.motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import Eliminated, Solution, closed, solve
+from selfmotion.planning.paper.ends import from_unknowns, to_unknowns
 from selfmotion.planning.paper.objective import residual_tangents, residuals, unmet
 from selfmotion.planning.rollout import FreeStart, converged_minimum_norm
 from support.arms import PANDA_HOME, central_difference, robot_named
@@ -156,8 +157,8 @@ def test_an_inverse_hessian_comes_back_from_decision_vectors() -> None:
     found = solved("position", CLOSED_PATHS["closed in velocity"])
     function = Eliminated(found.objective, found.x)
     root = np.random.default_rng(3).normal(size=(function.size, function.size))
-    known = function.outward(np.zeros(function.size), root @ root.T)
-    np.testing.assert_allclose(function.inward(known), root @ root.T, atol=1e-8)
+    known = from_unknowns(function, np.zeros(function.size), root @ root.T)
+    np.testing.assert_allclose(to_unknowns(function, known), root @ root.T, atol=1e-8)
 
 
 def test_a_closed_point_is_the_nearest_in_the_metric() -> None:

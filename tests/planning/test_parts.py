@@ -11,7 +11,7 @@ import selfmotion as sm
 import selfmotion.shell.testing
 from selfmotion.basics import Array, NoSequenceError, ProblemError
 from selfmotion.model.path import section_at_rest
-from selfmotion.problem.problem import times_along
+from selfmotion.problem.problem import envelope_of_problem, times_along
 from support.arms import robot_named
 
 # The planar arm keeps about this shape, and its first joint turns by so much at most.
@@ -70,7 +70,10 @@ def faults(parts: sm.Parts) -> list[str]:
     for order, limit in ((1, SPEED), (2, ACCELERATION)):
         if np.abs(whole(t, order)).max() > limit * (1.0 + 1e-9):
             found.append(f"limit of order {order}")
-    lower, upper = problem.envelope.lower, problem.envelope.upper
+    lower, upper = (
+        (limits := envelope_of_problem(problem)).lower,
+        limits.upper,
+    )
     if np.any(whole(t) < lower - 1e-9) or np.any(whole(t) > upper + 1e-9):
         found.append("position limits")
     stops = [0.0, *parts.cuts, problem.path.duration]

@@ -10,6 +10,7 @@ import selfmotion as sm
 from selfmotion.errors import FileFormatError, ProblemError
 from selfmotion.model.robot import SwivelAngle
 from selfmotion.problem.constraints import NO_OVERLAP
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.result import Reason, RedundancyMap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.redundancy_laws import faults
@@ -60,7 +61,7 @@ def circle(*, post: bool = False, clearance: float = 0.0) -> sm.Plan:
 
 
 def bodies_of(plan: sm.Plan) -> Bodies:
-    model, _ = plan.problem.envelope.bodies[0]
+    model, _ = envelope_of_problem(plan.problem).bodies[0]
     return Bodies(plan.robot, model.obstacles, model.pairs)
 
 
@@ -173,7 +174,7 @@ def test_the_planar_arm_is_as_the_law_of_cosines_has_it():
 def test_a_panda_is_as_brute_force_has_it():
     plan = circle(post=True)
     shown = plan.redundancy_map(shape=(21, 61))
-    model, required = plan.problem.envelope.bodies[0]
+    model, required = envelope_of_problem(plan.problem).bodies[0]
     own = plan.trajectory(shown.times)
     oracle = Oracle(plan.problem, shown, own, model.obstacles, model.pairs, required)
     columns = [4, 13]

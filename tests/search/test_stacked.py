@@ -11,6 +11,7 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import Coordinates
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import Stacked, metrics, start_candidates
+from selfmotion.problem.problem import envelope_of_problem
 from support.arms import robot_named
 from support.cones import UPRIGHT, downhand
 
@@ -48,7 +49,7 @@ def test_the_torch_stays_upright_and_the_table_turns(lean: float) -> None:
     t, motions = carried(problem, np.ones(8))
     assert len(motions) > 1
     turn = problem.robot.joint_names.index("table/turn")
-    (tilt,) = problem.envelope.quantities
+    (tilt,) = envelope_of_problem(problem).quantities
     for motion in motions:
         assert misses(problem, t, motion) <= ON_PATH
         still = np.zeros_like(motion)
@@ -64,7 +65,7 @@ def test_without_rows_it_leans() -> None:
         problem, constraints=[item for item in problem.constraints if item is not UPRIGHT]
     )
     _, motions = carried(free, np.ones(8))
-    (tilt,) = problem.envelope.quantities
+    (tilt,) = envelope_of_problem(problem).quantities
     for motion in motions:
         still = np.zeros_like(motion)
         assert np.linalg.norm(tilt.away(motion, still, still), axis=2).max() > tilt.bounds[0]

@@ -8,6 +8,7 @@ from scipy.optimize import linprog
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.result import Reason, RedundancyMap
 from support.redundancy_oracle import Bodies, Coordinate, Kinematics
 
@@ -31,7 +32,11 @@ def faults(plan: sm.Plan, shown: RedundancyMap, bodies: Bodies | None = None) ->
     checks = [*_misplaced(plan, shown, known), *_limits(plan, shown, known)]
     checks += [*_line(plan, shown), *_singular(plan, shown, known), *_speeds(plan, shown, known)]
     if bodies is not None:
-        checks += _bodies(shown, bodies, plan.problem.envelope.bodies[0][1])
+        checks += _bodies(
+            shown,
+            bodies,
+            envelope_of_problem(plan.problem).bodies[0][1],
+        )
     if (known == (shown.state == Reason.NO_CONFIGURATION)).any():
         checks.append("'no configuration' where there is one, or the reverse")
     return checks
@@ -61,7 +66,7 @@ def _misplaced(plan: sm.Plan, shown: RedundancyMap, known: Any) -> list[str]:
 
 def _limits(plan: sm.Plan, shown: RedundancyMap, known: Any) -> list[str]:
     """Return where a reason does not agree with the limits of position."""
-    envelope, found = plan.problem.envelope, []
+    envelope, found = envelope_of_problem(plan.problem), []
     q = np.where(known[:, :, None], shown.q, 0.0)
     beyond = known & ((q > envelope.upper) | (q < envelope.lower)).any(axis=2)
     if ((shown.state == Reason.LIMIT) != beyond).any():
@@ -113,7 +118,7 @@ def _singular(plan: sm.Plan, shown: RedundancyMap, known: Any) -> list[str]:
 
 def _speeds(plan: sm.Plan, shown: RedundancyMap, known: Any) -> list[str]:
     """Return whether linear programmes say otherwise of speeds at some pixels."""
-    limit = plan.problem.envelope.speed
+    limit = envelope_of_problem(plan.problem).speed
     follows = Formulation.of(plan.problem).follows
     if shown.redundancy != 1:
         return (

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion.basics import Array, Flags, Ints
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.result import Reason, RedundancyMap
 from support.own_kinematics import Arm
 
@@ -341,7 +342,7 @@ class Oracle:
         robot = self.problem.robot
         state = np.full(q.shape[:2], int(Reason.NO_CONFIGURATION))
         known = ~np.isnan(q).any(axis=2)
-        envelope = self.problem.envelope
+        envelope = envelope_of_problem(self.problem)
         inside = known & (q <= envelope.upper).all(axis=2) & (q >= envelope.lower).all(axis=2)
         state[known] = int(Reason.LIMIT)
         state[inside] = int(Reason.ALLOWED)

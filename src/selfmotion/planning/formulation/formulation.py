@@ -29,7 +29,6 @@ from selfmotion.problem.constraints import (
     BoundConstraint,
     BoundEnd,
     BoundLimits,
-    Clearance,
     Conditions,
     Constraint,
     DependsOn,
@@ -39,7 +38,14 @@ from selfmotion.problem.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.problem.costs import Cost, JointVelocity, Samples
-from selfmotion.problem.problem import Problem, given_end, length_of, smooth_knots
+from selfmotion.problem.problem import (
+    Problem,
+    envelope_of_problem,
+    envelope_without_arm,
+    given_end,
+    length_of,
+    smooth_knots,
+)
 
 
 class BoundConditions(NamedTuple):
@@ -127,22 +133,12 @@ class Formulation:
             else read_only(completed(self.follows, np.zeros(1), start[None])[0])
         )
 
-    @cached_property
-    def no_overlap(self) -> Clearance | None:
-        """The last clearance, if it asks no more than that links do not overlap; else None.
-
-        Motions are optimised without it at first: few break it, and distances take long.
-        """
-        last = self.problem.clearances[-1:]
-        lazy = (item for item in last if item.is_no_overlap and item.applies(self.robot))
-        return next(lazy, None)
-
     def conditions(
         self, start: Array, end: Array, *, apart: bool = True, decomposed: bool = False
     ) -> BoundConditions:
         """Return the conditions on motions, given first and last configuration, (n,) each.
 
-        Those of the initial motion. Without `no_overlap` unless `apart`; with links
+        Those of the initial motion. Without that of `has_no_overlap` unless `apart`; with links
         `decomposed` where their hulls are too large. With the arm's own limits where constraints
         have none: no motion beyond these is verified. With the bands of tolerances, and that pinned
         ends are on the path.
@@ -167,24 +163,20 @@ class Formulation:
 
     @cached_property
     def envelope_without_arm(self) -> Envelope:
-        """See `Problem.envelope_without_arm`."""
-        return _with_virtual(self, self.problem.envelope_without_arm)
+        """Limits and bodies of the constraints, without the arm's own limits."""
+        problem = self.problem
+        return _with_virtual(self, envelope_without_arm(problem.robot, problem.all_constraints))
 
     @cached_property
     def envelope(self) -> Envelope:
-        """See `Problem.envelope`: with the limits of virtual joints after the arm's."""
-        return _with_virtual(self, self.problem.envelope)
+        """The same, with the arm's own limits; those of virtual joints come after them."""
+        problem = self.problem
+        return _with_virtual(self, envelope_of_problem(problem))
 
     @cached_property
     def knots(self) -> Array:
         """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
         return smooth_knots(self.problem.follows, self.problem.relaxations)
-
-    @cached_property
-    def highest_order(self) -> int:
-        """Order of the highest derivative of q that costs are quadratic forms of; 0 for none."""
-        dof = self.robot.dof
-        return max((order for cost in self.costs for order in cost.curvature(dof)), default=0)
 
     @cached_property
     def speed_weights(self) -> Array:
@@ -204,6 +196,15 @@ class Formulation:
     def length_in_reaches(self) -> float:
         """Path length of the tool, as a multiple of the arm's reach."""
         return length_of(self.path) / self.robot.reach
+
+
+def has_no_overlap(problem: Problem) -> bool:
+    """Whether the last clearance requires no more than that links do not overlap.
+
+    Motions are optimised without it at first: few break it, and distances take long.
+    """
+    last = problem.clearances[-1:]
+    return any(item.is_no_overlap and item.applies(problem.robot) for item in last)
 
 
 def on_path(problem: Problem) -> Formulation:
@@ -282,9 +283,9 @@ def cost_of_motion(formulation: Formulation, motion: SampledMotion) -> float:
 def keeps_off_itself(formulation: Formulation, q: Array) -> bool:
     """Whether the arm's meshes in configurations (K, n) are free of self-collision.
 
-    Only for `no_overlap`: other clearances are the optimisation's.
+    Only for that of `has_no_overlap`: other clearances are the optimisation's.
     """
-    if formulation.no_overlap is None:
+    if not has_no_overlap(formulation.problem):
         return True
     own = q[:, : formulation.robot.dof]
     return all(model.worst(own).value >= far for model, far in formulation.envelope.bodies)
@@ -295,7 +296,7 @@ def _conditions(formulation: Formulation, *, apart: bool, decomposed: bool) -> C
     known, problem = formulation._known_conditions, formulation.problem
     if (apart, decomposed) not in known:
         given = [*_own_limits(formulation), *problem.all_constraints]
-        if formulation.no_overlap is not None and not apart:
+        if has_no_overlap(formulation.problem) and not apart:
             given.pop()
         if all(formulation.problem.rest_orders):
             given = [item.at_rest() for item in given]

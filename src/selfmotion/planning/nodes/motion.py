@@ -159,20 +159,9 @@ class NodeGrid:
         manifold.
         """
         if qdd is None:
-            qdd = self._accelerations(q, qd)
+            qdd = hermite_accelerations(self.spline, len(self._times), q, qd)
         found = self.manifolds.near(q, self.rested(qd, 1), self.rested(qdd, 2))
         return None if found is None else self.at(found)
-
-    def _accelerations(self, q: Array, qd: Array) -> Array:
-        """Return q̈ at the nodes: means of those of the Hermite cubics on both sides."""
-        h, size = self.spline.steps[:, None], len(self._times)
-        rise, first, second = (q[1:] - q[:-1]) / h, qd[:-1], qd[1:]
-        left = (6.0 * rise - 4.0 * first - 2.0 * second) / h
-        right = (-6.0 * rise + 2.0 * first + 4.0 * second) / h
-        after, before = np.concatenate([left, left[-1:]]), np.concatenate([right[:1], right])
-        found = 0.5 * (before + after)
-        found[::size], found[size - 1 :: size] = after[::size], before[size - 1 :: size]
-        return np.asarray(found)
 
     def around(self, charts: Charts, qd: Array, qdd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose rates are nearest to q̇ and q̈, or None."""
@@ -305,6 +294,21 @@ class NodeMotion:
         place, names = self.place, self.grid.formulation.coordinates.names
         q, qd, qdd = (read_only(x) for x in (place.q, place.qd, place.qdd))
         return Trajectory(self.grid.t, q, qd, names, qdd)
+
+
+def hermite_accelerations(spline: Quintic, size: int, q: Array, qd: Array) -> Array:
+    """Return q̈ at the nodes (N + 1, n): means of those of the Hermite cubics on both sides.
+
+    Of motions of `size` nodes each, one after the other.
+    """
+    h = spline.steps[:, None]
+    rise, first, second = (q[1:] - q[:-1]) / h, qd[:-1], qd[1:]
+    left = (6.0 * rise - 4.0 * first - 2.0 * second) / h
+    right = (-6.0 * rise + 2.0 * first + 4.0 * second) / h
+    after, before = np.concatenate([left, left[-1:]]), np.concatenate([right[:1], right])
+    mean = 0.5 * (before + after)
+    mean[::size], mean[size - 1 :: size] = after[::size], before[size - 1 :: size]
+    return np.asarray(mean)
 
 
 def centred(motion: NodeMotion) -> Centred:

@@ -94,7 +94,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
 
 def _is_smooth(formulation: Formulation) -> bool:
     """Whether the costs penalise q̈ or the jerk themselves."""
-    return formulation.highest_order > 1
+    return highest_order(formulation) > 1
 
 
 def _of_rest(formulation: Formulation, t: Array, quick: float) -> Array:
@@ -121,6 +121,12 @@ def _of_held(formulation: Formulation, t: Array) -> tuple[Array, Array]:
 def _faded(away: Array, starting: float) -> Array:
     """Return 1 that fades out: where b ended abruptly, accelerations would jump."""
     return np.asarray(np.maximum(1.0 - (away / (_NEAR_REST * starting)) ** 2, 0.0) ** 3)
+
+
+def highest_order(formulation: Formulation) -> int:
+    """Return the order of the highest derivative of q that costs are quadratic forms of, or 0."""
+    dof = formulation.robot.dof
+    return max((order for cost in formulation.costs for order in cost.curvature(dof)), default=0)
 
 
 def can_be_smoothed(formulation: Formulation, samples: Samples, cost: float) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model.motion import Sampling
+from selfmotion.planning.nodes.differences import Differences
 from selfmotion.planning.nodes.node_matrix import EndChanges
 
 # Orders of derivatives: q, q̇, q̈ and the jerk.
@@ -64,8 +65,6 @@ def _controls() -> tuple[Array, ...]:
     return tuple(found)
 
 
-# Nodes in a finite-difference stencil.
-_STENCIL = 5
 AT_GAUSS = unit_bases(GAUSS)
 AT_CONTROLS = _controls()
 AT_END = unit_bases(np.ones(1))
@@ -111,6 +110,8 @@ class Quintic:
         each = (h[:, None] * WEIGHTS).ravel()
         self.sampling = Sampling(times, each, np.arange(len(times)))
         self._powers = self.steps[:, None] ** _SCALED
+        # Quadratic forms take them of twice an order.
+        self._rates = [self.steps ** float(-order) for order in range(2 * ORDERS - 1)]
 
     @property
     def count(self) -> int:
@@ -124,28 +125,9 @@ class Quintic:
         return Sampling.trapezoidal(np.append(inner, self.t[-1]))
 
     @cached_property
-    def _stencils(self) -> tuple[Ints, Array]:
-        """Nodes of each node's difference stencil, and weights: (N + 1, S), (2, N + 1, S)."""
-        count = len(self.t)
-        width = min(_STENCIL, count)
-        first = np.clip(np.arange(count) - width // 2, 0, count - width)
-        which = first[:, None] + np.arange(width)
-        far = self.t[which] - self.t[:, None]
-        usual = np.abs(far).max(axis=1)[:, None, None]
-        powers = (far[:, None, :] / usual) ** np.arange(width)[None, :, None]
-        wanted = np.eye(width, 3)[:, 1:]
-        found = np.linalg.solve(powers, np.broadcast_to(wanted, (count, *wanted.shape)))
-        found *= np.array([1.0, 2.0]) / usual ** np.array([1.0, 2.0])
-        return which, np.moveaxis(found, 2, 0)
-
-    def differences(self, x: Array) -> tuple[Array, Array]:
-        """Return the first two time derivatives at the nodes of values x (N + 1, n) there.
-
-        Of polynomials through five nodes; for one motion only.
-        """
-        which, shares = self._stencils
-        first, second = (shares[:, :, None, :] @ x[which])[:, :, 0]
-        return first, second
+    def differences(self) -> Differences:
+        """Time derivatives of values at the nodes; for one motion only."""
+        return Differences(self.t)
 
     def ends(self, nodes: Array) -> Array:
         """Return y of each interval, (N, 6, n), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
@@ -177,13 +159,7 @@ class Quintic:
 
     def rates(self, order: int) -> Array:
         """Return h^-o, (N,)."""
-        if order not in self._rates:
-            self._rates[order] = np.asarray(self.steps ** float(-order))
         return self._rates[order]
-
-    @cached_property
-    def _rates(self) -> dict[int, Array]:
-        return {}
 
     def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
         """Return a derivative at shares of all intervals, (N, S, n), for their U_o and y."""

@@ -7,6 +7,7 @@ from selfmotion.planning.paper.ends import Eliminated as Eliminated, closed as c
 from selfmotion.planning.paper.objective import (
     Objective as Objective,
     node_tangents as node_tangents,
+    parts_of as parts_of,
 )
 from selfmotion.planning.paper.solution import (
     Method as Method,

@@ -139,14 +139,16 @@ class Eliminated:
         responses = np.linalg.lstsq(rows @ self._across, rows @ self._along)[0]
         return np.asarray(self._along - self._across @ responses)
 
-    def inward(self, inverse_hessian: Array) -> Array:
-        """Return an inverse Hessian by x as one by y, near the reference."""
-        return np.asarray(self._inward @ inverse_hessian @ self._inward.T)
 
-    def outward(self, y: Array, inverse_hessian: Array) -> Array:
-        """Return an inverse Hessian by y as one by x, of the directions that meet the ends."""
-        tangent = self.tangent(y)
-        return np.asarray(tangent @ inverse_hessian @ tangent.T)
+def to_unknowns(function: Eliminated, inverse_hessian: Array) -> Array:
+    """Return an inverse Hessian by x as one by y, near the reference."""
+    return np.asarray(function._inward @ inverse_hessian @ function._inward.T)
+
+
+def from_unknowns(function: Eliminated, y: Array, inverse_hessian: Array) -> Array:
+    """Return an inverse Hessian by y as one by x, of the directions that meet the ends."""
+    tangent = function.tangent(y)
+    return np.asarray(tangent @ inverse_hessian @ tangent.T)
 
 
 def newton(function: Eliminated, x: Array, halvings: int = 1) -> tuple[Array, float, int]:

@@ -242,10 +242,6 @@ class Objective:
         """Number of evaluations of F, by all with the same counters."""
         return self.counts.evaluations
 
-    def parts(self, x: Array) -> tuple[Array, Array]:
-        """Return the parts z and x of the decision vector."""
-        return x[: self.start.size], x[self.start.size :]
-
     def value(self, x: Array) -> float:
         """Return the cost at x; infinite where the motion breaks down."""
         _run(self, x)
@@ -301,6 +297,11 @@ class Objective:
         """
         by_q, by_qd = _sensitivities(self, x)
         return self._costs.curvature(by_q, by_qd, lambda: _error_tangent(self, by_q))
+
+
+def parts_of(objective: Objective, x: Array) -> tuple[Array, Array]:
+    """Return the parts of a decision vector: z of the start, and the null motion's coefficients."""
+    return x[: objective.start.size], x[objective.start.size :]
 
 
 def _pulled_back(objective: Objective, x: Array) -> Array:
@@ -394,7 +395,7 @@ def _run(objective: Objective, x: Array) -> None:
 
 
 def _evaluate(objective: Objective, x: Array) -> None:
-    z, coefficients = objective.parts(x)
+    z, coefficients = parts_of(objective, x)
     start = objective.start.configuration(z, objective._first)
     objective._broken = 0.0 if start is None else None
     if start is None:

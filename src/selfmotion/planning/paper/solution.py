@@ -27,8 +27,8 @@ from selfmotion.planning.optimise import (
     QuasiNewton,
     Status,
 )
-from selfmotion.planning.paper.ends import Eliminated, closed
-from selfmotion.planning.paper.objective import Objective, require_finite_at, unmet
+from selfmotion.planning.paper.ends import Eliminated, closed, from_unknowns, to_unknowns
+from selfmotion.planning.paper.objective import Objective, parts_of, require_finite_at, unmet
 from selfmotion.planning.rollout import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.problem.constraints import BoundConstraint
 
@@ -158,7 +158,7 @@ class Solution:
     @property
     def coefficients(self) -> Array:
         """The null motion's coefficients, (size without z,)."""
-        return self.objective.parts(self.x)[1].copy()
+        return parts_of(self.objective, self.x)[1].copy()
 
     @property
     def steps(self) -> int:
@@ -242,11 +242,12 @@ class Solution:
                 return self, None
             if not function.is_met(y):
                 return replace(self, status=Status.INFEASIBLE), None
-            inverse = None if inverse is None else function.inward(inverse)
+            inverse = None if inverse is None else to_unknowns(function, inverse)
             found, iterates, left = method.minimum(
                 function, y, inverse, function.where, before is not None
             )
-            x, inverse = function.point(found.x), function.outward(found.x, found.inverse_hessian)
+            x = function.point(found.x)
+            inverse = from_unknowns(function, found.x, found.inverse_hessian)
         else:
             found, iterates, left = method.minimum(objective, self.x, inverse)
             x, inverse = np.array(found.x), found.inverse_hessian

@@ -16,7 +16,7 @@ from selfmotion.planning.planner.run import plan
 from selfmotion.planning.result import Plan
 from selfmotion.planning.search import carried, start_candidates
 from selfmotion.planning.transfer import Room
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, envelope_of_problem
 
 # Starts that are tried for each requested branch.
 _BRANCH_TRIES = 4
@@ -118,7 +118,7 @@ def near_start(problem: Problem, q: Array) -> Array | None:
 
     None where it finds none that is allowed.
     """
-    robot = problem.envelope.arm(problem.robot)
+    robot = envelope_of_problem(problem).arm(problem.robot)
     try:
         start = robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed=q, attempts=1)
     except SelfmotionError:
@@ -127,12 +127,12 @@ def near_start(problem: Problem, q: Array) -> Array | None:
 
 
 def _room(problem: Problem) -> Room:
-    return Room(problem.envelope, problem.robot)
+    return Room(envelope_of_problem(problem), problem.robot)
 
 
 def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     """Return allowed starts, each as far as any from those before, the first in the middle."""
-    allowed = problem.envelope
+    allowed = envelope_of_problem(problem)
     follows = within_limits(problem.follows, allowed.lower, allowed.upper)
     own, room = follows.coordinates, _room(problem)
     try:
@@ -164,7 +164,7 @@ def _end_distance(one: Plan, other: Plan) -> float:
 
 def _nowhere(problem: Problem) -> str:
     """Return the cause why a path has no start."""
-    allowed, follows = problem.envelope, problem.follows
+    allowed, follows = envelope_of_problem(problem), problem.follows
     try:
         starts = np.array(start_candidates(follows, _BRANCH_TRIES, np.random.default_rng(0)))
     except SelfmotionError as error:

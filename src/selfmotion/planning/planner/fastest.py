@@ -31,7 +31,12 @@ from selfmotion.planning.planner.run import plan, with_ending
 from selfmotion.planning.result import Plan, check_no_feed, rate_limits, retime
 from selfmotion.problem.constraints import Constraint, JointPositionLimits, JointVelocityLimits
 from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
-from selfmotion.problem.problem import Problem, along_other_paths, check_problem
+from selfmotion.problem.problem import (
+    Problem,
+    along_other_paths,
+    check_problem,
+    envelope_of_problem,
+)
 
 # Default deadline [s].
 _FASTEST_DEADLINE = 60.0
@@ -391,7 +396,7 @@ def _places_to_move(problem: Problem) -> Iterator[JointPositionLimits]:
     At no pace does a joint go where its limit of speed is 0.
     """
     start = problem.given_start
-    for curves in problem.envelope.curves:
+    for curves in envelope_of_problem(problem).curves:
         lower, upper = curves.resting[0] + _FROM_REST, curves.resting[1] - _FROM_REST
         if start is not None:
             # It stands where it stands.

@@ -7,7 +7,7 @@ import numpy as np
 from selfmotion.basics import Progress
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.model.motion import Evaluation, Trajectory
-from selfmotion.planning.formulation import Formulation, certified, path_errors
+from selfmotion.planning.formulation import Formulation, certified, has_no_overlap, path_errors
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.largest_part import Part
 from selfmotion.planning.planner.refinement import refined
@@ -172,7 +172,7 @@ class _ByPath:
 
 def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
     """Whether self-collision, which was not looked at before, is the only violation."""
-    if formulation.no_overlap is None or len(certificate.failures) != 1:
+    if not has_no_overlap(formulation.problem) or len(certificate.failures) != 1:
         return False
     # The finding of the last requirement; those of feeds come after it.
     feeds = sum(len(item.path.feeds) for item in formulation.problem.follows.items)
@@ -184,7 +184,7 @@ def _rough(formulation: Formulation, judged: Judged) -> bool:
     if judged.part.solution.violations or not judged.certificate.on_path:
         return False
     requirements = formulation.problem.requirements
-    if formulation.no_overlap is not None:
+    if has_no_overlap(formulation.problem):
         # It comes last, and need not have been a constraint of the nodes.
         requirements = requirements[:-1]
     # The arm's own limits always apply.

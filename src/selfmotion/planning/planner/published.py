@@ -23,7 +23,7 @@ from selfmotion.planning.formulation import (
     sampled,
 )
 from selfmotion.planning.optimise import Optimizer, Status
-from selfmotion.planning.paper import Method, Objective
+from selfmotion.planning.paper import Method, Objective, parts_of
 from selfmotion.planning.planner.guess import Guess, pace_of
 from selfmotion.planning.planner.outcomes import OutcomeFacts
 from selfmotion.planning.planner.solution import Solution
@@ -120,7 +120,7 @@ def _first_coefficients(begun: PublishedOutcome, guess: Guess) -> Array:
         return begun.x
     t, pace = objective.grid.stage_times, pace_of(plan, formulation)
     near = coefficients_of(plan.trajectory, pace, formulation, t, objective.null_motion)
-    z, _ = objective.parts(begun.x)
+    z, _ = parts_of(objective, begun.x)
     x = np.concatenate([z, near])
     return x if objective.value(x) <= guess.minimum_norm.cost else begun.x
 

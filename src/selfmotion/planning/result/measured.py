@@ -21,7 +21,7 @@ from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.model.robot import null_space
 from selfmotion.planning.result.pace_rows import PaceLimits
 from selfmotion.problem.costs import Cost, PlacedLater, Samples
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, envelope_of_problem
 
 # Share of a limit from which on it counts as fully used.
 FULLY = 0.95
@@ -65,7 +65,7 @@ def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, .
 
 def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
     """Return the shares of time in which a motion fully uses limits of a problem."""
-    envelope = problem.envelope
+    envelope = envelope_of_problem(problem)
     quantities = quantities_of_pace(problem.requirements)
     limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
     count = max(_LIMIT_OVERSAMPLING * len(motion.t), _FEWEST_EVALUATIONS)

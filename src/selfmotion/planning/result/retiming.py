@@ -33,7 +33,7 @@ from selfmotion.problem.constraints import (
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.problem.problem import Problem, along_other_paths
+from selfmotion.problem.problem import Problem, along_other_paths, envelope_of_problem
 
 # Times between two samples of the new motion [s]: the first one within the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
@@ -119,7 +119,11 @@ def retime(
     wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
     # The problem's own limits apply as well: the tighter of both.
     robot = plan.robot
-    kept = reduce(and_, (item.envelope(robot) for item in wanted), plan.problem.envelope)
+    kept = reduce(
+        and_,
+        (item.envelope(robot) for item in wanted),
+        envelope_of_problem(plan.problem),
+    )
     quantities = quantities_of_pace(plan.requirements)
     limits = PaceLimits(kept.speed, kept.acceleration, kept.jerk, quantities)
     for step in _STEPS:
@@ -161,7 +165,7 @@ def at_rate(plan: Plan, rate: float) -> Plan:
             f"{MOST_SAMPLES / duration:.4g}, so that the motion of {duration:.6g} s has samples, "
             f"not too many"
         )
-    envelope = plan.problem.envelope
+    envelope = envelope_of_problem(plan.problem)
     limits = envelope.speed, envelope.acceleration, envelope.jerk
     periods = int(np.ceil(duration * rate - _WHOLE))
     for _ in range(_SLOWER):
@@ -264,7 +268,7 @@ def rate_limits(
     ProblemError
         One is not positive, or no joint's acceleration is limited.
     """
-    robot, limits = problem.robot, problem.envelope
+    robot, limits = problem.robot, envelope_of_problem(problem)
     v = limits.speed if velocity is None else velocity
     a = limits.acceleration if acceleration is None else acceleration
     v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)

@@ -40,21 +40,15 @@ class Rollout:
         self._kinematics = kinematics_of(follows).each
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(follows.duration)
-        self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
+        self._table, self._at, self._tips = _new_table(self, len(grid.stage_times))
         self._space = np.zeros(kernels.space_size(*_sizes(self)[:2]))
         # Cached values of the last run.
         self._samples: Samples | None = None
         # Work space of `polished`: one stage, at a node.
-        self._node_table, self._node, self._node_tips = self._new_table(1)
+        self._node_table, self._node, self._node_tips = _new_table(self, 1)
         for f, item in enumerate(follows.items):
             self.aim(item.target(grid.stage_times), f)
         self._at.step[:, 0] = grid.stage_steps
-
-    def _new_table(self, stages: int) -> tuple[Array, kernels.Stage, list[kernels.Tip]]:
-        n, m, count = _sizes(self)
-        table = np.zeros((stages, kernels.columns(n, m, count)))
-        tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
-        return table, kernels.stage_of(table, n, m), tips
 
     def aim(self, target: PathSamples, f: int = 0) -> None:
         """Let tip f follow other poses and twists from now on, given at the stages (S)."""
@@ -227,6 +221,14 @@ class Rollout:
 
 def _sizes(rollout: Rollout) -> tuple[int, int, int]:
     return rollout.follows.dof, rollout.follows.dimension, len(rollout.follows.items)
+
+
+def _new_table(rollout: Rollout, stages: int) -> tuple[Array, kernels.Stage, list[kernels.Tip]]:
+    """Return a table of kernels for a number of stages, and its views of joints and tips."""
+    n, m, count = _sizes(rollout)
+    table = np.zeros((stages, kernels.columns(n, m, count)))
+    tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
+    return table, kernels.stage_of(table, n, m), tips
 
 
 def _wrong(rollout: Rollout, tips: list[kernels.Tip], stages: Ints) -> Array:

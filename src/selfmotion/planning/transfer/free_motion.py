@@ -169,7 +169,7 @@ class FreeMotions:
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(_TRIES_OF_MOVE):
             room = Room(self.envelope, self.robot, margin, finer)
-            polyline = self._known_polyline(room, ends, known) or self._polyline(
+            polyline = _known_polyline(self, room, ends, known) or self._polyline(
                 room, ends, began + seconds
             )
             if polyline is None:
@@ -192,18 +192,6 @@ class FreeMotions:
     def refusal(self, q: Array) -> str:
         """Return the cause why no motion starts or ends at a configuration (n,), "" for none."""
         return "" if Room(self.envelope, self.robot, 0.0).free(q[None])[0] else _wrong_with(self, q)
-
-    def _known_polyline(
-        self, room: Room, ends: Sequence[Array], known: Array | None
-    ) -> tuple[Array, list[int]] | None:
-        """Return a known polyline (m, n), if it is free and not straight."""
-        if known is None or straight_legs(room, ends[0], ends[-1]) is not None:
-            return None
-        # On limits, the ends are put inside them.
-        known = np.concatenate([ends[0], known[1:-1], ends[-1]])
-        if not all(room.is_open(*leg) for leg in pairwise(known)):
-            return None
-        return shortened(room, known, self._rng), []
 
     def _polyline(
         self, room: Room, ends: Sequence[Array], end: float
@@ -326,6 +314,19 @@ def _wrong_with(motions: FreeMotions, q: Array) -> str:
             return f"{near.first} and {near.second} {apart}"
     names = ", ".join(item.name for item in envelope.quantities)
     return f"it leaves what is asked of {names}"
+
+
+def _known_polyline(
+    motions: FreeMotions, room: Room, ends: Sequence[Array], known: Array | None
+) -> tuple[Array, list[int]] | None:
+    """Return a known polyline (m, n), if it is free and not straight."""
+    if known is None or straight_legs(room, ends[0], ends[-1]) is not None:
+        return None
+    # On limits, the ends are put inside them.
+    known = np.concatenate([ends[0], known[1:-1], ends[-1]])
+    if not all(room.is_open(*leg) for leg in pairwise(known)):
+        return None
+    return shortened(room, known, motions._rng), []
 
 
 def _leg(motions: FreeMotions, room: Room, starts: Array, goals: Array, end: float) -> Array | None:

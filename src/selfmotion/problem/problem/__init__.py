@@ -30,6 +30,7 @@ from selfmotion.problem.problem.problem import (
     along_other_paths as along_other_paths,
     check_feeds_of as check_feeds_of,
     check_problem as check_problem,
+    envelope_of_problem as envelope_of_problem,
 )
 from selfmotion.problem.problem.saved_problem import (
     arm_and_constraints as arm_and_constraints,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from selfmotion.basics import description_of, digest_of, digest_of_file
 from selfmotion.model.robot import mesh_digests
 from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.problem.along import envelope_without_arm
 
 if TYPE_CHECKING:
     from selfmotion.problem.problem.problem import Problem
@@ -51,7 +52,7 @@ def conditions_digest(problem: "Problem", former: Sequence[Constraint] | None = 
 
 def _mesh_digests(problem: "Problem") -> dict[str, str]:
     """Return digests of the mesh files of all collision bodies: names may stay the same."""
-    if not problem.envelope_without_arm.bodies:
+    if not envelope_without_arm(problem.robot, problem.all_constraints).bodies:
         return {}
     bodies = (body for item in problem.requirements for body in item.obstacles)
     files = {str(file): digest_of_file(file) for body in bodies for file in body.files}

@@ -46,9 +46,9 @@ from selfmotion.problem.constraints import (
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
     arm_rest_orders,
+    envelope_of,
     envelope_without_arm,
     given_end,
-    with_own_limits,
 )
 from selfmotion.problem.problem.digest import conditions_digest
 from selfmotion.problem.problem.fit import (
@@ -246,7 +246,7 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        kept = self.envelope
+        kept = envelope_of(self.robot, self.all_constraints)
         limits = BeyondLimits(_BEYOND_LIMITS, kept.lower, kept.upper, kept.speed)
         return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
@@ -283,22 +283,11 @@ class Problem:
     def _judging(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
-    @cached_property
-    def envelope_without_arm(self) -> Envelope:
-        """The envelope of the constraints, without the arm's own limits."""
-        return envelope_without_arm(self.robot, self.all_constraints)
-
-    @cached_property
-    def envelope(self) -> Envelope:
-        """The same, with the arm's own limits where the certificate judges these."""
-        return with_own_limits(self.robot, self.requirements, self.envelope_without_arm)
-
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes before planning: overlapping links, suspicious limits or placements."""
-        found = remarks_on(
-            self.robot, self.follows, self.constraints, self.requirements, self.envelope
-        )
+        envelope = envelope_of(self.robot, self.all_constraints)
+        found = remarks_on(self.robot, self.follows, self.constraints, self.requirements, envelope)
         return tuple(dict.fromkeys(found))
 
     def certify(
@@ -379,10 +368,16 @@ def _rest(problem: Problem, start: int, end: int) -> tuple[Requirement, ...]:
 Problem.__init__.__annotations__["task"] = "Task | str"
 
 
+def envelope_of_problem(problem: Problem) -> Envelope:
+    """Return the envelope of a problem's constraints and of its arm's own limits."""
+    return envelope_of(problem.robot, problem.all_constraints)
+
+
 def check_feeds_of(problem: Problem) -> None:
     """Refuse feeds that no motion has; see `check_feeds`."""
     paths = [item.path for item in problem.follows.items]
-    check_feeds(problem.robot.name, paths, problem.envelope_without_arm.tool_speed)
+    limits = envelope_without_arm(problem.robot, problem.all_constraints)
+    check_feeds(problem.robot.name, paths, limits.tool_speed)
 
 
 def check_problem(problem: object) -> None:

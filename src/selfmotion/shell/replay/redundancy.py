@@ -18,6 +18,7 @@ from selfmotion.planning.redundancy import (
     shown_scale,
 )
 from selfmotion.planning.result import Plan
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.shell.replay.meshes import Json, Payload
 
 # Quantisation of joints: 16 bits of each joint's range, some 0.1 mrad.
@@ -77,7 +78,7 @@ def slices(
 
     Those after the first one, and all where a body is not convex, have at most `FEWER_PIXELS`.
     """
-    are_convex = all(model.is_all_convex for model, _ in plan.problem.envelope.bodies)
+    are_convex = all(model.is_all_convex for model, _ in envelope_of_problem(plan.problem).bodies)
     fewer = (min(most[0], FEWER_PIXELS[0]), min(most[1], FEWER_PIXELS[1]))
     names = plan.redundancy_coordinates()[:count]
     return tuple(

@@ -12,6 +12,7 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.redundancy import PIXELS
 from selfmotion.planning.result import Plan
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.shell.facts import plan_facts
 from selfmotion.shell.replay import scene
 from selfmotion.shell.replay.facts import Cell, cells, describe
@@ -216,4 +217,4 @@ class PlanReplay:
 
 def clearance_of(plan: Plan) -> ClearanceCurve | None:
     """Return the distances of a plan's bodies over time; None where there are none."""
-    return clearance_curve(plan.trajectory, plan.problem.envelope.bodies)
+    return clearance_curve(plan.trajectory, envelope_of_problem(plan.problem).bodies)

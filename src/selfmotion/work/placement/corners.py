@@ -27,6 +27,7 @@ from selfmotion.basics import (
 )
 from selfmotion.model.path import spread_along
 from selfmotion.planning.result import Plan
+from selfmotion.problem.problem import envelope_of_problem
 from selfmotion.work.placement.places import COORDINATES, Places, Tried, places_of
 
 # Two motions are near each other while no joint differs by more than this [rad or m].
@@ -274,7 +275,7 @@ def _room(places: Places, plan: Plan, direction: Array) -> float:
     frame = follows.items[0].chain.base_placement
     by = frame.inverse() * by * frame
     item, room = follows.items[0], math.inf
-    envelope = plan.problem.envelope
+    envelope = envelope_of_problem(plan.problem)
     for q in plan.trajectory(np.minimum(t, plan.trajectory.t[-1])):
         pose = item.chain.place(q)
         twist = item.task.twist_error(by * pose, pose)
