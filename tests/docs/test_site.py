@@ -13,8 +13,8 @@ import pytest
 import shown
 
 import selfmotion as sm
-from selfmotion import realtime
-from selfmotion.shell import replay, testing
+from selfmotion import realtime, replay
+from selfmotion.shell import testing
 from support.doors import named, offered
 from support.layouts import WIDTHS, chromium, faults
 from support.places import ROOT

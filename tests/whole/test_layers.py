@@ -1,4 +1,4 @@
-"""No circles of imports among the files of a package; layers of packages are lint's."""
+"""No circles of imports in a package, none past another's door; layers of packages are lint's."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -74,3 +74,37 @@ def test_circles_are_seen() -> None:
     assert circle({**sources, "c": typed}, "package") == []
     assert circle({"a": "from package import b", "b": ""}, "package") == []
     assert circle({"a": "from package import x", "b": ""}, "package") == ["a", "a"]
+
+
+# What compiles ahead names kernels of all packages.
+COMPILES_AHEAD = "realtime/warm.py"
+# Folders of a package in its wing: `selfmotion.model.robot`.
+DEPTH = 3
+
+
+def past_doors(text: str, package: str) -> list[str]:
+    """Return the files of other packages that a file of a package imports from, without a door."""
+    modules = [module for module, _ in imported(ast.parse(text))]
+    parts = [module.split(".") for module in modules]
+    return [
+        ".".join(each)
+        for each in parts
+        if each[0] == "selfmotion" and len(each) > DEPTH and each[:DEPTH] != package.split(".")
+    ]
+
+
+def test_nothing_is_imported_past_the_door_of_another_package() -> None:
+    found = {}
+    for file in SOURCE.rglob("*.py"):
+        place = file.relative_to(SOURCE.parent)
+        package = ".".join(place.parent.parts[:DEPTH])
+        past = past_doors(file.read_text("utf-8"), package)
+        if past and not place.as_posix().endswith(COMPILES_AHEAD):
+            found[place.as_posix()] = past
+    assert found == {}
+
+
+def test_an_import_past_a_door_is_seen() -> None:
+    text = "from selfmotion.model.path.feed import Feed\nfrom selfmotion.model.robot import Chain"
+    assert past_doors(text, "selfmotion.model.robot") == ["selfmotion.model.path.feed"]
+    assert past_doors(text, "selfmotion.model.path") == []

@@ -7,8 +7,7 @@ import numpy as np
 from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints, kernel
-from selfmotion.model.robot import Chain, Kinematics, place_tips
-from selfmotion.model.robot.tree_arrays import JOINT
+from selfmotion.model.robot import JOINT, Chain, Kinematics, place_tips
 from selfmotion.model.task import SE3
 
 

@@ -26,8 +26,7 @@ from itertools import pairwise
 import numpy as np
 
 from selfmotion.basics import Array, Flags, ProblemError
-from selfmotion.model.robot import Chain
-from selfmotion.model.robot.tree_arrays import AXIS, JOINT, POSITION, ROTATION
+from selfmotion.model.robot import AXIS, JOINT, POSITION, ROTATION, Chain
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
 
 # A window's end may be off by this share of the motion, from rounding.

@@ -13,14 +13,22 @@ without damping, or with a fixed path, do not wait for these.
 """
 
 from selfmotion.model.kernels.algebra import (
+    Vector as Vector,
+    add_angular as add_angular,
+    angular as angular,
+    angular_part as angular_part,
     carried as carried,
     cholesky as cholesky,
     clear_held as clear_held,
+    cross as cross,
+    dot as dot,
     factor_damped as factor_damped,
     finite as finite,
     gram as gram,
     gram_determinants as gram_determinants,
+    linear as linear,
     log_determinant_slopes as log_determinant_slopes,
+    plus as plus,
     respond as respond,
     solve_cholesky as solve_cholesky,
     transport as transport,

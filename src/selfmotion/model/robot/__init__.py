@@ -67,3 +67,9 @@ __all__ = [
     "JointCoordinate",
     "SwivelAngle",
 ]
+from selfmotion.model.robot.tree_arrays import (
+    AXIS as AXIS,
+    JOINT as JOINT,
+    POSITION as POSITION,
+    ROTATION as ROTATION,
+)

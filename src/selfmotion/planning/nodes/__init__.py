@@ -21,4 +21,5 @@ from selfmotion.planning.nodes.rows import (
     kinks as kinks,
     multipliers_of as multipliers_of,
 )
+from selfmotion.planning.nodes.settings import SETTINGS as SETTINGS
 from selfmotion.planning.nodes.smoothness import rest_times as rest_times

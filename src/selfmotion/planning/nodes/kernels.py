@@ -19,12 +19,20 @@ from selfmotion.model.kernels import (
     Every,
     Stage,
     Tip,
+    Vector,
+    add_angular,
+    angular,
+    angular_part,
     approach,
     cholesky,
     clear_held,
+    cross,
+    dot,
     errors_and_rows,
     finite,
     gram,
+    linear,
+    plus,
     respond,
     rows_of,
     select,
@@ -32,16 +40,6 @@ from selfmotion.model.kernels import (
     stage_of,
     tip_of,
     view,
-)
-from selfmotion.model.kernels.algebra import (
-    Vector,
-    add_angular,
-    angular,
-    angular_part,
-    cross,
-    dot,
-    linear,
-    plus,
 )
 from selfmotion.model.robot import place_tips
 

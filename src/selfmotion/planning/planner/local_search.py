@@ -9,8 +9,15 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
-from selfmotion.planning.nodes import NodeGrid, NodeMotion, Optimum, centred, minimise, on_grid
-from selfmotion.planning.nodes.settings import SETTINGS
+from selfmotion.planning.nodes import (
+    SETTINGS,
+    NodeGrid,
+    NodeMotion,
+    Optimum,
+    centred,
+    minimise,
+    on_grid,
+)
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.first_motions import (

@@ -5,16 +5,18 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.model.kernels import (
+    Vector,
     cholesky,
     clear_held,
+    cross,
+    dot,
     errors_and_rows,
     gram,
+    plus,
     rows_of,
     solve_cholesky,
 )
-from selfmotion.model.kernels.algebra import Vector, cross, dot, plus
-from selfmotion.model.robot import place_tips
-from selfmotion.model.robot.tree_arrays import AXIS, JOINT
+from selfmotion.model.robot import AXIS, JOINT, place_tips
 
 # Kinds of a coordinate, first entry of a code: a joint's own coordinate, its number the second …
 OWN = 0

@@ -37,9 +37,12 @@ from selfmotion.problem.constraints import (
     Constraint,
     separate_clearances,
 )
-from selfmotion.problem.problem.digest import conditions_digest
-from selfmotion.problem.problem.problem import Problem
-from selfmotion.problem.problem.saved_problem import problem_from_dict, problem_to_dict
+from selfmotion.problem.problem import (
+    Problem,
+    conditions_digest,
+    problem_from_dict,
+    problem_to_dict,
+)
 
 
 def in_order_of(robot: RobotModel, motion: Trajectory) -> Trajectory:

@@ -62,7 +62,7 @@ from selfmotion.planning.result.measured import (
 from selfmotion.planning.result.report import FUNCTION, Report
 from selfmotion.planning.result.reversals import Reversals
 from selfmotion.problem.costs import Cost, FunctionCost, LostCost, metres_of
-from selfmotion.problem.problem.problem import Problem
+from selfmotion.problem.problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,6 +18,7 @@ from selfmotion.problem.problem.calibrated import (
     off_nominal as off_nominal,
     start_on_path as start_on_path,
 )
+from selfmotion.problem.problem.digest import conditions_digest as conditions_digest
 from selfmotion.problem.problem.fit import (
     KEPT as KEPT,
     OF_MAKER as OF_MAKER,

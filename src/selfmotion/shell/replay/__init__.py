@@ -5,13 +5,37 @@ from selfmotion.shell.replay.browser import (
     render_gif as render_gif,
     render_png as render_png,
 )
+from selfmotion.shell.replay.content import plan_content as plan_content
+from selfmotion.shell.replay.links import (
+    GHOST as GHOST,
+    ROBOT as ROBOT,
+    joint_name as joint_name,
+    safe as safe,
+)
 from selfmotion.shell.replay.meshcat_page import (
     meshcat_html as meshcat_html,
     write_meshcat as write_meshcat,
 )
+from selfmotion.shell.replay.meshes import Json as Json, Payload as Payload
 from selfmotion.shell.replay.page import (
+    live_html as live_html,
     notebook_html as notebook_html,
     replay_html as replay_html,
     write_replay as write_replay,
 )
-from selfmotion.shell.replay.still import figure as figure
+from selfmotion.shell.replay.redundancy import (
+    MOST_SEAMS as MOST_SEAMS,
+    SLICES as SLICES,
+    SeamMaps as SeamMaps,
+    slices as slices,
+    tree as tree,
+)
+from selfmotion.shell.replay.replayed import PlanReplay as PlanReplay, Replayed as Replayed
+from selfmotion.shell.replay.sequence import (
+    Mark as Mark,
+    SequenceReplay as SequenceReplay,
+    seam_color as seam_color,
+    stand_in as stand_in,
+    unproved as unproved,
+)
+from selfmotion.shell.replay.still import figure as figure, picture as picture

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from selfmotion.basics import PlanError, ProblemError, as_path, shown, write_text
 from selfmotion.planning.result import Plan
-from selfmotion.shell.replay.sequence import seam_color
-from selfmotion.shell.replay.still import picture
+from selfmotion.shell.replay import picture, seam_color
 from selfmotion.shell.sheet.tables import Section, plan_sections, program_sections
 from selfmotion.work.job import Program
 from selfmotion.work.margins import Margins

@@ -7,7 +7,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Plan
 from selfmotion.shell.facts import Fact, finding_facts, margin_facts, plan_facts, with_unit
-from selfmotion.shell.replay.sequence import seam_color
+from selfmotion.shell.replay import seam_color
 from selfmotion.work.job import Program, Step
 from selfmotion.work.margins import Margins
 

@@ -10,7 +10,7 @@ from typing_extensions import override
 from selfmotion.basics import PlanError, ProblemError, SelfmotionError, shown
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Plan
-from selfmotion.shell.replay.meshes import Json
+from selfmotion.shell.replay import Json
 from selfmotion.shell.view.document import Edited, EditedPlan
 from selfmotion.shell.view.handles import Handle, dragged, handles_of
 from selfmotion.shell.view.page_session import PageSession

@@ -9,7 +9,7 @@ from selfmotion.model.follow import is_plain
 from selfmotion.model.path import spread_along
 from selfmotion.planning.search import Manifold, spread
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.replay.meshes import Json, Payload
+from selfmotion.shell.replay import Json, Payload
 from selfmotion.shell.view.handles import Handle
 
 # Places are as far apart as this share of the arm's reach, and so many from the middle to the end.

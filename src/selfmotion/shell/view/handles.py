@@ -10,8 +10,7 @@ from selfmotion.basics import ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.replay.links import GHOST, ROBOT, joint_name, safe
-from selfmotion.shell.replay.meshes import Json
+from selfmotion.shell.replay import GHOST, ROBOT, Json, joint_name, safe
 from selfmotion.shell.view.document import Keys, at, is_job
 from selfmotion.shell.view.poses import read_pose, rounded, write_pose
 

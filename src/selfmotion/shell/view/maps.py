@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Progress
 from selfmotion.planning.redundancy import PIXELS
 from selfmotion.planning.result import Plan
-from selfmotion.shell.replay.redundancy import MOST_SEAMS, SLICES, SeamMaps, slices
+from selfmotion.shell.replay import MOST_SEAMS, SLICES, SeamMaps, slices
 from selfmotion.shell.view.requests import Outcome
 
 # All maps of a page are made in about this time [s]; on machines that are busy it is more.

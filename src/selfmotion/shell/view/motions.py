@@ -11,7 +11,7 @@ from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob
-from selfmotion.shell.replay.sequence import Mark, SequenceReplay, stand_in, unproved
+from selfmotion.shell.replay import Mark, SequenceReplay, stand_in, unproved
 from selfmotion.work.job import Program, Step, backwards
 
 # Times of a coarse motion.

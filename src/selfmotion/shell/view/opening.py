@@ -6,8 +6,7 @@ from pathlib import Path
 from selfmotion.basics import ProblemError, SelfmotionError
 from selfmotion.planning.result import Parts, load_parts, load_plan
 from selfmotion.shell.documents import plan_request_of
-from selfmotion.shell.replay.replayed import PlanReplay
-from selfmotion.shell.replay.sequence import SequenceReplay
+from selfmotion.shell.replay import PlanReplay, SequenceReplay
 from selfmotion.shell.view.document import EditedPlan
 from selfmotion.shell.view.edit_session import EditSession
 from selfmotion.shell.view.motions import shown_as_written, shown_program

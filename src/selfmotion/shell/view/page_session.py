@@ -8,9 +8,7 @@ from typing import Any
 
 from selfmotion.basics import FileFormatError, PlanError, ProblemError
 from selfmotion.planning.result import Parts, Plan, load_plan
-from selfmotion.shell.replay.meshes import Json
-from selfmotion.shell.replay.page import live_html
-from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay import Json, PlanReplay, live_html
 from selfmotion.shell.view.requests import Outcome
 from selfmotion.shell.view.shown import Shown
 from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion

@@ -19,7 +19,7 @@ from selfmotion.planning.planner import PlanRequest, plan
 from selfmotion.planning.result import Plan, retime
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob, plan_request_of, seam_job_of
-from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay import PlanReplay
 from selfmotion.shell.view.document import is_job
 from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.handles import handles_of

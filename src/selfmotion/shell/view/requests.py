@@ -6,8 +6,7 @@ from typing import Any
 
 from selfmotion.model.path import Path
 from selfmotion.planning.result import Parts, Plan
-from selfmotion.shell.replay.redundancy import SeamMaps
-from selfmotion.shell.replay.replayed import Replayed
+from selfmotion.shell.replay import Replayed, SeamMaps
 from selfmotion.shell.view.floor import Floor
 from selfmotion.work.job import Program
 

@@ -9,11 +9,16 @@ from selfmotion.basics import Array
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Parts, Plan
-from selfmotion.shell.replay import links, scene, three
-from selfmotion.shell.replay.content import plan_content
-from selfmotion.shell.replay.meshes import Json, Payload
-from selfmotion.shell.replay.redundancy import tree
-from selfmotion.shell.replay.replayed import PlanReplay
+from selfmotion.shell.replay import (
+    Json,
+    Payload,
+    PlanReplay,
+    links,
+    plan_content,
+    scene,
+    three,
+    tree,
+)
 from selfmotion.shell.view.handles import PLAN, handles_of
 from selfmotion.shell.view.requests import Outcome
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from selfmotion.shell.replay.meshes import Json
+from selfmotion.shell.replay import Json
 from selfmotion.shell.view.document import Keys, at
 
 # A slider goes from a part of its number to a multiple; where it begins at 0, to this [m].
