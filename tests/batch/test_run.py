@@ -93,6 +93,18 @@ def test_a_batch_plans_what_python_plans(reference: sm.Batch) -> None:
     assert best.cost == min(row.cost for row in reference.rows)
 
 
+def test_values_that_are_set_are_of_all_combinations(grid: Path, tmp_path: Path) -> None:
+    items = grid_items(grid, {"rest": False})
+    assert len(items) == 6
+    assert not any(item.make().problem.rest for item in items)
+    write = items[0].write
+    assert write is not None
+    write(tmp_path / "one.toml")
+    assert "rest = false" in (tmp_path / "one.toml").read_text()
+    with pytest.raises(sm.errors.ProblemError, match=r"path\.duration is a key of its grid"):
+        grid_items(grid, {"path.duration": 3.0})
+
+
 def test_two_processes_and_threads_give_the_same(
     reference: sm.Batch, grid: Path, tmp_path: Path
 ) -> None:

@@ -277,6 +277,11 @@ def test_what_says_how_to_plan_is_refused_of_a_motion_that_is_there(
         assert f"--set {name}: says how to plan" in complaint("check", *options, "--set", key)
 
 
+def test_costs_are_refused_of_a_motion_that_is_there(plan: Path) -> None:
+    said = complaint("check", plan, "--set", "costs.JointVelocity.weight=2")
+    assert "a verdict does not depend on costs" in said
+
+
 def test_a_motion_of_a_problem_file_is_judged_by_the_tolerance_that_is_set(
     plan: Path, tmp_path: Path
 ) -> None:

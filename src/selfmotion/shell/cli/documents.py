@@ -193,6 +193,17 @@ def refuse_how_to_plan(said: Said, besides: str = "") -> None:
             )
 
 
+def refuse_costs(said: Said) -> None:
+    """Raise ProblemError for keys of costs, which no verdict depends on."""
+    for text in said.settings or ():
+        key, _ = parse_setting(text)
+        if key.partition(".")[0] == "costs":
+            raise sm.errors.ProblemError(
+                f"--set {key}: a verdict does not depend on costs: leave it out (compare tells "
+                f"what motions cost)"
+            )
+
+
 def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
     """Return the first of several problem files whose motion is verified.
 

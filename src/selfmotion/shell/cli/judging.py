@@ -96,6 +96,7 @@ class Asked:
 
     def judged(self, progress: Progress) -> Judged:
         """Return the certificate of the motion, by whatever says what is asked of it."""
+        documents.refuse_costs(self.said)
         if self.file.suffix == ".npz":
             plan = sm.load_plan(self.file, progress=progress)
             return Judged(*checks.of_plan(plan, self.said, self.within, progress, self.calibration))

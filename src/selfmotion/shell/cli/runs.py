@@ -3,7 +3,7 @@
 import time
 from collections.abc import Container, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -32,6 +32,7 @@ from selfmotion.shell.cli.app import (
     stages,
     terminal,
 )
+from selfmotion.shell.documents import parse_setting
 
 if TYPE_CHECKING:
     from selfmotion.work.batch import Item
@@ -70,6 +71,7 @@ def batch(
     workers: options.WorkersOption = None,
     dask: options.DaskOption = None,
     deadline: options.DeadlineOption = None,
+    settings: options.SetOption = None,
     replays: Annotated[
         int, typer.Option(min=0, help="Write replays of so many of the best plans.")
     ] = 3,
@@ -85,7 +87,7 @@ def batch(
 
     check_cluster(dask, workers)
     out = out or Path("out/batch")
-    several = [_items_of(file, len(files) > 1, out, allow_code) for file in files]
+    several = [_items_of(file, settings, len(files) > 1, out, allow_code) for file in files]
     items = [item for each in several for item in each]
     names = [item.name for item in items]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -113,13 +115,22 @@ def batch(
     raise typer.Exit(VERIFIED if is_answered(several, verified) else NOT_VERIFIED)
 
 
-def _items_of(file: Path, is_one_of_many: bool, out: Path, allow_code: bool) -> list["Item"]:
+def _changes(settings: Sequence[str] | None, folder: Path) -> dict[str, Any]:
+    """Return the values by keys of ``KEY=VALUE``; files in them are named from a folder."""
+    pairs = [parse_setting(text, folder) for text in settings or ()]
+    options.refuse_twice("--set", [key for key, _ in pairs])
+    return dict(pairs)
+
+
+def _items_of(
+    file: Path, settings: Sequence[str] | None, is_one_of_many: bool, out: Path, allow_code: bool
+) -> list["Item"]:
     """Return what a file asks to plan; of many files, one that cannot be read is a row, too."""
     from selfmotion.shell.documents import grid_items
     from selfmotion.work.batch import unread_item
 
     try:
-        found = list(grid_items(file, allow_code=allow_code))
+        found = list(grid_items(file, _changes(settings, file.parent), allow_code=allow_code))
         has_outputs = bool(basics.read_document(file).get("outputs"))
     except sm.errors.FileFormatError as error:
         if not is_one_of_many:
