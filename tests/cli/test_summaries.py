@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.shell.cli import app, summaries
-from selfmotion.shell.cli.summaries import in_shell
+from selfmotion.shell.cli.option_names import in_shell
 from selfmotion.shell.cli.tables import show_certificate
 from support.arms import robot_named
 from support.shell import complaint, invoke, on_circle

@@ -9,6 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
+from selfmotion.planning.planner import LOOK_AT_POSES, NOTHING_IN_THE_WAY
 from selfmotion.shell.cli.summaries import blocked_text
 from selfmotion.shell.documents import example_text
 from support.arms import robot_named
@@ -140,7 +141,7 @@ def test_where_no_motion_was_found_past_an_obstacle_it_is_said_with_what_may_hel
         for item in made.certificate.findings
     ]
     failed = replace(made.certificate, findings=tuple(findings), failures=("overlap",))
-    looked = sm.result.Attempt("look at single poses", "nothing is in the way", None, 0.0)
+    looked = sm.result.Attempt(LOOK_AT_POSES, NOTHING_IN_THE_WAY, None, 0.0)
     blocked = replace(made, certificate=failed, report=replace(made.report, attempts=(looked,)))
     said = blocked_text(blocked)
     assert "no continuous motion was found" in said

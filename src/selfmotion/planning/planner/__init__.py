@@ -12,3 +12,7 @@ from selfmotion.planning.planner.guess import check_joints as check_joints
 from selfmotion.planning.planner.parts import plan_in_parts as plan_in_parts
 from selfmotion.planning.planner.request import GOALS as GOALS, PlanRequest as PlanRequest
 from selfmotion.planning.planner.run import plan as plan
+from selfmotion.planning.planner.steps import (
+    LOOK_AT_POSES as LOOK_AT_POSES,
+    NOTHING_IN_THE_WAY as NOTHING_IN_THE_WAY,
+)

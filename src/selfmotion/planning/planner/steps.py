@@ -45,6 +45,8 @@ from selfmotion.planning.planner.verdicts import (
 from selfmotion.planning.result import Attempt
 from selfmotion.planning.search import Obstruction, obstruction
 
+# Step that checks single poses first, and its outcome where all are within reach.
+LOOK_AT_POSES, NOTHING_IN_THE_WAY = "look at single poses", "nothing is in the way"
 _WHERE_IT_BREAKS = "starts where it breaks"
 
 
@@ -87,7 +89,7 @@ def _outcome(planner: Planner) -> tuple[str, float | None]:
         return f"all constraints are met{itself}", best.outcome.cost
     if planner.failure is not None:
         return str(planner.failure), None
-    return planner.blocked.reason if planner.blocked else "nothing is in the way", None
+    return planner.blocked.reason if planner.blocked else NOTHING_IN_THE_WAY, None
 
 
 def _look_first(planner: Planner) -> bool:
@@ -381,7 +383,7 @@ def _passing(blocked: Obstruction) -> str:
 # Names as in reports; each function returns whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     # Single poses first: a failure before anything is planned.
-    ("look at single poses", _look_first),
+    (LOOK_AT_POSES, _look_first),
     ("part before a pose out of reach", _plan_before_blocked_pose),
     # Propose and optimise until one suffices.
     ("motion that is known", _follow_guide),

@@ -28,7 +28,7 @@ from selfmotion.basics import seconds_waited_for_kernels, version
 from selfmotion.planning.optimise import Iteration
 from selfmotion.shell.cli import tables
 from selfmotion.shell.cli.moved import moved
-from selfmotion.shell.cli.summaries import in_shell
+from selfmotion.shell.cli.option_names import in_shell
 
 if TYPE_CHECKING:
     from selfmotion.work.batch import BatchProgress

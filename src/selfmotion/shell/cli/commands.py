@@ -17,7 +17,8 @@ from selfmotion.shell.cli import (
     judging,
     options,
     outputs,
-    summaries,
+    parts,
+    result_json,
     tables,
 )
 from selfmotion.shell.cli.app import (
@@ -81,7 +82,7 @@ def plan(
     given = {} if deadline is None else {"deadline": deadline}
     if job.goal == "parts":
         options.refuse_unused({"from": warm, **given}, "a motion in parts")
-        jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json, verbose)
+        parts.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json, verbose)
     if job.goal == "fastest":
         options.refuse_unused({"from": warm}, "the fastest motion")
         result = _fastest(job, as_json, **given)
@@ -216,7 +217,7 @@ def check(
     request = judging.Asked(file, robot, said, calibration, degrees, within)
     request.refuse_others()
     if request.is_job:
-        jobs.check(file, as_json, verbose)
+        parts.check_saved(file, as_json, verbose)
     if request.is_of_program:
         checks.of_program(file, Path(robot or ""), within, as_json, verbose)
     with StageDisplay(stages) as display:
@@ -224,7 +225,7 @@ def check(
     outputs.print_notes(judged.notes)
     if as_json:
         facts = certificate_facts(judged.certificate, judged.near, judged.arm)
-        data = summaries.certificate_json(judged.certificate, judged.near, facts)
+        data = result_json.certificate_json(judged.certificate, judged.near, facts)
         data["remarks"] = [*judged.notes, *data["remarks"]]
         print_json(data | checks.left_to_controller(judged.program))
     else:
@@ -252,7 +253,7 @@ def compare(
     costs = _common_costs(settings or [], next(iter(saved.values())))
     table = sm.compare(saved, costs=costs)
     if as_json:
-        told = {name: summaries.plan_json(plan) for name, plan in saved.items()}
+        told = {name: result_json.plan_json(plan) for name, plan in saved.items()}
         for number, data in enumerate(told.values() if costs else ()):
             data["measured"] = {name: each[number] for name, each in table.costs.items()}
         print_json(told)
@@ -263,7 +264,7 @@ def compare(
 def _compare_programs(programs: dict[str, sm.Program], as_json: bool) -> None:
     """Print what is known of programs, side by side."""
     if as_json:
-        print_json({name: summaries.program_json(each) for name, each in programs.items()})
+        print_json({name: result_json.program_json(each) for name, each in programs.items()})
     else:
         columns = {name: facts_of_program(each) for name, each in programs.items()}
         tables.show_side_by_side(columns, terminal)

@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion.planning.result import is_move
-from selfmotion.shell.cli import jobs, options, outputs, reread
+from selfmotion.shell.cli import jobs, options, outputs, parts, reread
 from selfmotion.shell.cli.app import (
     FILES,
     NOT_VERIFIED,
@@ -100,7 +100,7 @@ def _loaded(file: Path, *, parts: bool) -> reread.Planned:
 def _read(file: Path) -> reread.Planned:
     if file.suffix == jobs.PROGRAM:
         return sm.load_program(file)
-    if file.suffix == jobs.PARTS:
+    if file.suffix == parts.PARTS:
         return sm.files.load_parts(file)
     return sm.files.load_move(file) if is_move(file) else sm.load_plan(file)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme
-from selfmotion.shell.cli import checks, documents, jobs, options
+from selfmotion.shell.cli import checks, documents, jobs, options, parts
 from selfmotion.shop import controllers
 
 
@@ -74,7 +74,7 @@ class Asked:
     @property
     def is_job(self) -> bool:
         """Whether the file is of several motions, which say themselves what they are judged by."""
-        return self.file.suffix in (jobs.PROGRAM, jobs.PARTS)
+        return self.file.suffix in (jobs.PROGRAM, parts.PARTS)
 
     @property
     def is_of_program(self) -> bool:

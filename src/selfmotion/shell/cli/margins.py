@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import checks, documents, options, outputs, summaries
+from selfmotion.shell.cli import checks, documents, options, outputs, result_json
 from selfmotion.shell.cli.app import (
     LOOK,
     NOT_VERIFIED,
@@ -252,7 +252,7 @@ def plan_margin(
             progress=display.stage,
         )
     if as_json:
-        print_json(summaries.plan_json(planned.plan) | {"reached": planned.reached})
+        print_json(result_json.plan_json(planned.plan) | {"reached": planned.reached})
     else:
         terminal.print(str(planned), markup=False, soft_wrap=True)
     outputs.write(planned.plan, out or [], None, terminal, quiet=as_json)

@@ -1,7 +1,7 @@
 """The files that a plan is written to, and the settings of what programs say."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -12,7 +12,7 @@ import selfmotion as sm
 from selfmotion import basics
 from selfmotion.certificate import Extreme
 from selfmotion.model.task import SE3
-from selfmotion.shell.cli import reread, summaries, tables
+from selfmotion.shell.cli import reread, result_json, summaries, tables
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
 from selfmotion.shell.cli.documents import Said
 from selfmotion.shop import controllers
@@ -36,6 +36,8 @@ def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> 
         stages.print(f"note: {told}", markup=False, soft_wrap=True)
 
 
+# End of the name of a timetable.
+TIMETABLE = ".timetable.csv"
 # Suffixes of messages that are written as text.
 _TEXT_SUFFIXES = (".yaml", ".yml", ".json")
 # Size of such a file above which a bag is advised [bytes].
@@ -62,10 +64,10 @@ def write(
         A file could not be written; says where the plan is.
     """
     written, faults = list[Path](), list[str]()
-    unsound = left_out(result)
+    reason = objection(result)
     for file in [*out, *([] if html is None else [html])]:
-        if unsound and is_motion(file):
-            print_left_out(file, console, unsound, quiet=quiet)
+        if reason and is_motion(file):
+            print_not_written(file, console, reason, quiet=quiet)
             continue
         try:
             _write_one(result, file, page=file is html)
@@ -131,13 +133,13 @@ def finish(
     Remarks on its problem are in what programs read; others were told before.
     """
     if as_json:
-        data = summaries.plan_json(result) | {"remarks": list(remarks)}
+        data = result_json.plan_json(result) | {"remarks": list(remarks)}
         print_json(data)
     else:
         show(result, verbose)
     sound = write(result, out, html, terminal, quiet=as_json, whole=verbose)
     sound &= result.certificate.verified
-    sound &= not (left_out(result) and any(map(is_motion, out)))
+    sound &= not (objection(result) and any(map(is_motion, out)))
     raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
 
 
@@ -159,19 +161,25 @@ def show_certificate(
         summaries.show_certificate(certificate, approaches, terminal)
 
 
+def is_timetable(file: Path) -> bool:
+    """Whether a file is a timetable of a program: seams and events with their times."""
+    return file.name.endswith(TIMETABLE)
+
+
 def is_motion(file: Path) -> bool:
     """Whether a file is a motion that a controller may be given."""
-    return file.suffix in controllers.SUFFIXES and file.suffix != ".npz"
+    is_one = file.suffix in controllers.SUFFIXES and file.suffix != ".npz"
+    return is_one and not is_timetable(file)
 
 
-def left_out(planned: sm.Plan | sm.Parts | sm.Program) -> str:
-    """Return why a motion is given to no controller, "" where nothing speaks against it."""
+def objection(planned: sm.Plan | sm.Parts | sm.Program) -> str:
+    """Return why a motion must not reach a controller; "" where nothing speaks against it."""
     verified = planned.certificate.verified if isinstance(planned, sm.Plan) else planned.verified
     return controllers.moving_ends(planned) if verified else "it is not verified"
 
 
-def print_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
-    """Say that a motion was not written, and why."""
+def print_not_written(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
+    """Print that a motion was not written, and why."""
     if not quiet:
         console.print(
             f"{file} is not written: {reason}; `selfmotion export --force` writes it",
@@ -228,11 +236,37 @@ def check_own(files: Sequence[Path], document: str, force: bool) -> None:
             )
 
 
-def check_suffixes(files: list[Path]) -> None:
-    """Raise FileFormatError for a file that --out cannot write."""
+def check_suffixes(files: Sequence[Path]) -> None:
+    """Raise FileFormatError for a file that --out cannot write of a plan."""
     for file in files:
-        if file.suffix not in (".npz", ".html", *controllers.SUFFIXES):
-            known = ", ".join(controllers.SUFFIXES)
-            raise sm.errors.FileFormatError(
-                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
-            )
+        check_suffix(file, ".npz", ".html", what=".npz (the plan), .html (its replay)")
+
+
+def check_suffix(file: Path, *suffixes: str, what: str) -> None:
+    """Raise FileFormatError for a file of another suffix than these, or than those of motions.
+
+    `what` describes files of these suffixes.
+    """
+    if file.suffix not in (*suffixes, *controllers.SUFFIXES) and not is_timetable(file):
+        raise sm.errors.FileFormatError(
+            f"{file}: --out writes {what} or the motion ({', '.join(controllers.SUFFIXES)})"
+        )
+
+
+def write_each(
+    planned: sm.Parts | sm.Program,
+    files: Sequence[Path],
+    write: Callable[[Path], None],
+    *,
+    quiet: bool,
+) -> None:
+    """Write each file of parts or of a program, but no motion that a controller must not get."""
+    reason = objection(planned)
+    for file in files:
+        if reason and is_motion(file):
+            print_not_written(file, terminal, reason, quiet=quiet)
+            continue
+        write(file)
+        if not quiet:
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+            print_large(file, terminal)

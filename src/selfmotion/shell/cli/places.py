@@ -10,7 +10,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion.basics import write_document
-from selfmotion.shell.cli import documents, options, summaries
+from selfmotion.shell.cli import documents, options, result_json
 from selfmotion.shell.cli.app import (
     PLAN,
     StageDisplay,
@@ -92,7 +92,7 @@ def place(
         _draw(placement, drawn, placement.map(points=points) if len(bounds) > 1 else None)
         written += drawn
     if as_json:
-        print_json(summaries.placement_json(placement) | {"written": [*map(str, written)]})
+        print_json(result_json.placement_json(placement) | {"written": [*map(str, written)]})
     else:
         print_written(written)
 

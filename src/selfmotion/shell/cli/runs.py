@@ -13,7 +13,7 @@ import selfmotion as sm
 from selfmotion import basics, realtime
 from selfmotion.basics import ALL_WORKS, compile_in_background
 from selfmotion.realtime.warm import Compiled, small_works
-from selfmotion.shell.cli import documents, options, outputs, summaries, tables
+from selfmotion.shell.cli import documents, options, outputs, result_json, summaries, tables
 from selfmotion.shell.cli.app import (
     BEGIN,
     FILES,
@@ -108,7 +108,7 @@ def batch(
         complain(f"stopped; what is finished is in '{out}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
     if as_json:
-        print_json(summaries.batch_json(result))
+        print_json(result_json.batch_json(result))
     else:
         tables.show_batch(result, terminal)
     verified = {row.name for row in result.rows if row.verified}
@@ -151,7 +151,7 @@ def robots(as_json: options.JsonOption = False) -> None:
     """List the arms known by name: joints, tool frame, and redundancy for each task."""
     arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
     if as_json:
-        print_json(summaries.robots_json(arms))
+        print_json(result_json.robots_json(arms))
     else:
         tables.show_robots(arms, terminal)
 

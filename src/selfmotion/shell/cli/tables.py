@@ -16,7 +16,8 @@ from selfmotion.certificate import Certificate, Extreme
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Comparison, Gap, Plan, Report
-from selfmotion.shell.cli.summaries import in_shell, metres_text
+from selfmotion.shell.cli.option_names import in_shell
+from selfmotion.shell.cli.summaries import metres_text
 from selfmotion.shell.facts import Fact, certificate_facts, plan_facts, with_unit, without_repeats
 from selfmotion.work.job import Program
 

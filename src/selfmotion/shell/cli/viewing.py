@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import documents, jobs, options, outputs
+from selfmotion.shell.cli import documents, jobs, options, outputs, parts
 from selfmotion.shell.cli.app import LOOK, app, stages, terminal
 from selfmotion.shop import controllers
 
 # What a page can show.
 _SUFFIXES = (
     *(*documents.SUFFIXES, ".yaml", ".yml"),
-    *(".npz", jobs.PROGRAM, jobs.PARTS, *controllers.READ_PROGRAMS),
+    *(".npz", jobs.PROGRAM, parts.PARTS, *controllers.READ_PROGRAMS),
 )
 
 
@@ -44,8 +44,8 @@ def view(
     if file.suffix.lower() not in _SUFFIXES:
         raise sm.errors.ProblemError(
             f"{file}: has suffix '{file.suffix}', expected a problem file or a job file (.toml, "
-            f".json, .yaml), a plan (.npz), a {jobs.PROGRAM} or {jobs.PARTS} file, or a program of "
-            f"a controller with its {jobs.PROGRAM} as --robot"
+            f".json, .yaml), a plan (.npz), a {jobs.PROGRAM} or {parts.PARTS} file, or a program "
+            f"of a controller with its {jobs.PROGRAM} as --robot"
         )
     asked = outputs.program_settings(settings)
     with stages.status("planning …"):
