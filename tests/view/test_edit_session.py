@@ -86,14 +86,14 @@ def test_places_in_reach_are_told_while_something_is_dragged_and_no_longer(page)
     def places(by):
         page.drag("path", by, final=False)
         last(page)
-        return page.messages[-1]["floor"]["places"], page.session.found.floor
+        return page.messages[-1]["floor"]["places"], page.session.found.placements
 
     _, before = places(moved(x=0.02, y=0.01))
     _, same = places(moved(y=-0.03))
-    np.testing.assert_allclose(same.places, before.places, atol=1e-6)
-    np.testing.assert_array_equal(same.reached, before.reached)
+    np.testing.assert_allclose(same.positions, before.positions, atol=1e-6)
+    np.testing.assert_array_equal(same.is_reachable, before.is_reachable)
     _, lifted = places(moved(z=0.3))
-    assert lifted.reached.sum() < before.reached.sum()
+    assert lifted.is_reachable.sum() < before.is_reachable.sum()
     page.drag("path", moved(z=-0.3))
     last(page)
     assert "floor" not in page.messages[-1]

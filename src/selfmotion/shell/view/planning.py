@@ -21,7 +21,6 @@ from selfmotion.problem.problem import Problem
 from selfmotion.shell.documents import SeamJob, plan_request_of, seam_job_of
 from selfmotion.shell.replay import PlanReplay
 from selfmotion.shell.view.document import is_job
-from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.handles import handles_of
 from selfmotion.shell.view.maps import maps_soon
 from selfmotion.shell.view.motions import (
@@ -31,6 +30,7 @@ from selfmotion.shell.view.motions import (
     standing,
     standing_program,
 )
+from selfmotion.shell.view.placement_map import PlacementMap
 from selfmotion.shell.view.requests import NewerRequest, Outcome, Request
 from selfmotion.work.job import Program
 
@@ -71,8 +71,8 @@ class Planning:
         self._cache: dict[str, Any] = {}
         self._given = initial
         # The places in reach, and what they are of; those of the request that is answered.
-        self._places: tuple[Any, Floor | None] = None, None
-        self._floor: dict[int, Floor | None] = {}
+        self._last_map: tuple[Any, PlacementMap | None] = None, None
+        self._maps: dict[int, PlacementMap | None] = {}
         self._first: Outcome | None = None
         self.last: Plan | None = None
         self.last_program: Program | None = None
@@ -132,7 +132,7 @@ class Planning:
         outcome = Outcome(request, "none", "", None)
         for outcome in answers(request):
             # As long as the hand stays there what is found has them, too.
-            outcome = replace(outcome, floor=self._floor.get(request.number))
+            outcome = replace(outcome, placements=self._maps.get(request.number))
             self._tell(outcome)
         self._leave(request)
         return outcome
@@ -169,7 +169,7 @@ class Planning:
         first = self._coarse(job.problem)
         if first is not None:
             begun = Outcome(request, "coarse", first.report.message, PlanReplay(first))
-            yield from self._with_floor(begun, [job.problem], [first.trajectory.q])
+            yield from self._with_placements(begun, [job.problem], [first.trajectory.q])
         self._leave(request)
         try:
             planned = self._whole(request, job)
@@ -201,7 +201,9 @@ class Planning:
             near = {name: plan.trajectory.q for name, plan in before.plans.items()}
             kept = [k for k, seam in enumerate(job.seams) if seam.name in near]
             problems = [job.problems[k] for k in kept]
-            yield from self._with_floor(begun, problems, [near[job.seams[k].name] for k in kept])
+            yield from self._with_placements(
+                begun, problems, [near[job.seams[k].name] for k in kept]
+            )
             self._leave(request)
             early = self._early(request, job, before)
             if early is not None:
@@ -222,12 +224,12 @@ class Planning:
         unmade = tuple(seam.path for seam in job.seams if seam.name in program.missing)
         yield Outcome(request, "whole", program.verdict, shown, program, unmade)
 
-    def _with_floor(
+    def _with_placements(
         self, outcome: Outcome, problems: Sequence[Problem], near: Sequence[Array]
     ) -> Iterator[Outcome]:
-        """Yield a first motion; while something is dragged with the places in reach.
+        """Yield a first motion; while something is dragged, with its placement map.
 
-        These are looked for once for all that is moved to and fro.
+        The map is made once for all that is moved to and fro.
         """
         request, plan = outcome.request, outcome.plan
         if request.drag is None or plan is None:
@@ -240,17 +242,18 @@ class Planning:
             return
         pose = handle.prefix * handle.pose
         key = (number, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
-        key_before, floor = self._places
-        if key_before != key:
-            floor = Floor(problems, near, handle) if Floor.can_move(problems, handle) else None
-            self._places = key, floor
-        self._floor = {request.number: floor}
+        last_key, placements = self._last_map
+        if last_key != key:
+            can_move = PlacementMap.can_move(problems, handle)
+            placements = PlacementMap(problems, near, handle) if can_move else None
+            self._last_map = key, placements
+        self._maps = {request.number: placements}
         yield outcome
-        # Some at least, so that they are all there in the end of a drag without a rest.
-        while floor is not None and not floor.is_done:
-            floor.look()
+        # One batch at least, so that a drag without a rest has all of them in the end.
+        while placements is not None and not placements.is_done:
+            placements.test_next()
             self._leave(request)
-            if floor.is_done:
+            if placements.is_done:
                 yield outcome
 
     def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:

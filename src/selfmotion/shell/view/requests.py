@@ -7,7 +7,7 @@ from typing import Any
 from selfmotion.model.path import Path
 from selfmotion.planning.result import Parts, Plan
 from selfmotion.shell.replay import Replayed, SeamMaps
-from selfmotion.shell.view.floor import Floor
+from selfmotion.shell.view.placement_map import PlacementMap
 from selfmotion.work.job import Program
 
 
@@ -49,7 +49,7 @@ class Outcome:
         Of a job the paths of the seams that are not made.
     maps : tuple of SeamMaps
         Redundancy maps, when they are made.
-    floor : Floor or None
+    placements : PlacementMap or None
         While a handle is dragged: where it could be as well.
     is_brief : bool
         Whether there is more to tell of it, which takes longer: distances, the redundancy map.
@@ -62,7 +62,7 @@ class Outcome:
     made: Program | Parts | None = None
     unmade: tuple[Path, ...] = ()
     maps: tuple[SeamMaps, ...] = ()
-    floor: Floor | None = None
+    placements: PlacementMap | None = None
     is_brief: bool = True
 
     @property

@@ -71,8 +71,8 @@ class Shown:
             if outcome.kind != "coarse" and not outcome.verified:
                 content["stopped"] = list(stopping(outcome, payload, self._radius))
             content |= self._arm(plan, payload)
-            if outcome.floor is not None:
-                content["floor"] = outcome.floor.json(payload)
+            if outcome.placements is not None:
+                content["floor"] = outcome.placements.json(payload)
             content["handles"] = handles_json(outcome.request.document, plan)
         return payload.data(content)
 

@@ -18,6 +18,13 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.arcs import arc_through, step_lengths
 from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
 from selfmotion.shop.controllers.pose_numbers import Rounding
+from selfmotion.shop.controllers.pose_steps import (
+    NoStepError,
+    SampledPoses,
+    Steps,
+    StepSearch,
+    StepTolerance,
+)
 from selfmotion.shop.controllers.program_texts import TIMES_HEADING
 from selfmotion.shop.controllers.segments import (
     SAMPLING_FACTOR,
@@ -28,7 +35,6 @@ from selfmotion.shop.controllers.segments import (
     aligned_quaternions,
     by_interpolation,
 )
-from selfmotion.shop.controllers.steps import Allowed, SampledPoses, Steps, StepSearch
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import Operation, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
@@ -176,10 +182,12 @@ class FeedSection(PoseSection):
         fixed = self._fixed_lengths(travel)
         along = self._sampled(travel, fixed)
         marks = [int(np.abs(along.travel - each).argmin()) for each in fixed]
-        limits = Allowed(allowed.position, allowed.rotation, free)
-        steps = StepSearch(self.frames, self.operation.rotation_task, along, limits).between(marks)
-        if not isinstance(steps, Steps):
-            return self._time_at(travel, along.travel[steps])
+        limits = StepTolerance(allowed.position, allowed.rotation, free)
+        search = StepSearch(self.frames, self.operation.rotation_task, along, limits)
+        try:
+            steps = search.through(marks)
+        except NoStepError as error:
+            return self._time_at(travel, along.travel[error.index])
         for _ in range(_MAX_REFINEMENTS):
             segment = self._segment(travel, along, steps)
             shares = self._deviation_shares(segment, limits)
@@ -238,7 +246,7 @@ class FeedSection(PoseSection):
         q = self._rounded(along.q[ends])
         positions, quaternions = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
         vias = np.full((len(ends) - 1, 3), np.nan)
-        for k in np.flatnonzero(steps.round):
+        for k in np.flatnonzero(steps.is_circular):
             via = along.middle(ends[k], ends[k + 1])
             via = self.rounding(via[None], quaternions[[k]])[0][0]
             arc = arc_through(positions[k], via, positions[k + 1])
@@ -289,7 +297,7 @@ class FeedSection(PoseSection):
                 speeds[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(speeds, _SPEED_DIGITS)
 
-    def _deviation_shares(self, segment: FeedSegment, allowed: Allowed) -> Array | float:
+    def _deviation_shares(self, segment: FeedSegment, allowed: StepTolerance) -> Array | float:
         """Return the deviation of each step as a share of its tolerance, (K,).
 
         Where the joints' deviation jumps between samples, as near a singular pose, that time [s].
@@ -308,7 +316,9 @@ class FeedSection(PoseSection):
             positions, quaternions = self.frames.tool_poses(line)
             shares = np.linalg.norm(positions - at, axis=1) / allowed.position
             shares = np.maximum(shares, np.abs(off).max(axis=1) / allowed.free)
-            turned = allowed.turned(self.frames, self.operation.rotation_task, quaternions, facing)
+            turned = allowed.rotation_shares(
+                self.frames, self.operation.rotation_task, quaternions, facing
+            )
             worst = np.maximum(worst, largest(np.maximum(shares, turned), count))
         return SAMPLING_FACTOR * worst
 

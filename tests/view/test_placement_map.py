@@ -8,8 +8,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.path import spread_along
 from selfmotion.model.task import SE3
-from selfmotion.shell.view.floor import Floor
 from selfmotion.shell.view.handles import handles_of
+from selfmotion.shell.view.placement_map import PlacementMap
 from support.views import CIRCLE
 
 # So many places in reach, and out of it, are looked at by other code, with so many starts.
@@ -18,7 +18,7 @@ GREEN, OTHERS, STARTS = 5, 2, 30
 
 @pytest.fixture(scope="module")
 def problem(tmp_path_factory):
-    file = tmp_path_factory.mktemp("floor") / "circle.toml"
+    file = tmp_path_factory.mktemp("map") / "circle.toml"
     file.write_text(CIRCLE)
     return sm.files.read_job(file).problem
 
@@ -38,21 +38,21 @@ def in_reach(problem, by):
 @pytest.mark.parametrize(("name", "way"), [("path", 1.0), ("base", -1.0)])
 def test_places_are_green_where_the_path_is_in_reach(problem, name, way):
     handle = handles_of(tomllib.loads(CIRCLE), problem)[name]
-    assert Floor.can_move([problem], handle)
-    found = Floor([problem], [problem.robot.home[None]], handle)
+    assert PlacementMap.can_move([problem], handle)
+    found = PlacementMap([problem], [problem.robot.home[None]], handle)
     while not found.is_done:
-        found.look()
+        found.test_next()
     here = (handle.prefix * handle.pose).translation[:2]
     for reached, count in ((True, GREEN), (False, OTHERS)):
-        places = found.places[found.reached == reached]
+        places = found.positions[found.is_reachable == reached]
         for place in places[:: len(places) // count]:
             assert in_reach(problem, way * (place - here)) == reached
 
 
-def test_what_is_no_place_of_the_path_has_no_floor(problem):
+def test_what_is_no_place_of_the_path_has_no_map(problem):
     handles = handles_of(tomllib.loads(CIRCLE), problem)
     for name in ("post", "tool"):
-        assert not Floor.can_move([problem], handles[name])
+        assert not PlacementMap.can_move([problem], handles[name])
 
 
 def test_of_several_paths_all_have_to_be_in_reach(problem):
@@ -61,10 +61,10 @@ def test_of_several_paths_all_have_to_be_in_reach(problem):
     home = problem.robot.home[None]
 
     def green(*problems):
-        found = Floor(problems, [home] * len(problems), handle)
+        found = PlacementMap(problems, [home] * len(problems), handle)
         while not found.is_done:
-            found.look()
-        return found.reached
+            found.test_next()
+        return found.is_reachable
 
     up = SE3(np.eye(3), np.array([0.0, 0.0, 0.25]))
     far = SE3(np.eye(3), np.array([0.0, 0.0, 5.0]))
