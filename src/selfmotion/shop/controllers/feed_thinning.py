@@ -316,10 +316,9 @@ class FeedSection(PoseSection):
             positions, quaternions = self.frames.tool_poses(line)
             shares = np.linalg.norm(positions - at, axis=1) / allowed.position
             shares = np.maximum(shares, np.abs(off).max(axis=1) / allowed.free)
-            turned = allowed.rotation_shares(
-                self.frames, self.operation.rotation_task, quaternions, facing
-            )
-            worst = np.maximum(worst, largest(np.maximum(shares, turned), count))
+            task = self.operation.rotation_task
+            rotation = allowed.rotation_shares(self.frames, task, quaternions, facing)
+            worst = np.maximum(worst, largest(np.maximum(shares, rotation), count))
         return SAMPLING_FACTOR * worst
 
 

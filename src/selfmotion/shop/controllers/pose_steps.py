@@ -189,12 +189,14 @@ class StepSearch:
 
     def _first_end(self, start: int, last: int, *, is_circular: bool, least: int) -> int | None:
         """Return the end of a first step within tolerance, of `least` or doubled lengths."""
-        doublings = _MAX_DOUBLINGS if is_circular else 1
-        lengths = ((least - start) * 2**k for k in range(doublings))
-        # Once each: all beyond the last sample end there.
-        for end in dict.fromkeys(min(start + length, last) for length in lengths):
+        length = least - start
+        for _ in range(_MAX_DOUBLINGS if is_circular else 1):
+            end = min(start + length, last)
             if end > start and self._is_within_tolerance(start, end, is_circular=is_circular):
                 return end
+            if end == last:
+                break
+            length *= 2
         return None
 
     def _equalised(self, steps: Steps) -> Steps:
