@@ -14,7 +14,7 @@ from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, cheapest, near_pairs
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.vertices import Admissible
-from selfmotion.problem.problem import given_end
+from selfmotion.problem.problem import prescribed_end
 
 # Cost of a change to another configuration: above that of any motion in between.
 _BREAK = 1e6
@@ -229,7 +229,7 @@ class ChainSegments:
         if start is not None:
             samples[0] = start[None]
         problem = self.formulation.problem
-        end = given_end(problem.robot, problem.constraints)
+        end = prescribed_end(problem.robot, problem.constraints)
         if end is not None:
             samples[-1] = end[None]
             self._keep_given(-1, "end configuration asked for")
