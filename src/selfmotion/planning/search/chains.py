@@ -10,7 +10,8 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.model.collision import Closest, CollisionModel
 from selfmotion.planning.search.curves import CurveSet, SelfMotion
-from selfmotion.planning.search.measures import Length, Measure
+from selfmotion.planning.search.layer_steps import unturned
+from selfmotion.planning.search.measures import JointTravel, Measure
 from selfmotion.planning.search.vertices import Admissible
 
 # Intervals of the spline that smooths a chain, per interval of the chain.
@@ -115,12 +116,12 @@ def best_chains(
     measure : Measure, optional
         By default the length, all joints alike.
     """
-    measure = Length(np.ones(len(turning))) if measure is None else measure
+    measure = JointTravel(np.ones(len(turning))) if measure is None else measure
     cost = [np.zeros(len(layers[0]))]
     parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
     steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
     for k, (before, after) in enumerate(itertools.pairwise(layers)):
-        reach, source = measure.extended(k, before, cost[-1], after, steps[k], turning)
+        reach, source = measure.relaxed_layer(k, before, cost[-1], after, steps[k], turning)
         cost.append(reach)
         parent.append(source)
     return Chains(tuple(cost), tuple(parent))
@@ -141,7 +142,7 @@ def diverse_chains(
     too few others.
     """
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
-    back = None if measure is None else measure.backwards()
+    back = None if measure is None else measure.reversed()
     reverse = best_chains(layers[::-1], backwards, turning, back)
     stations = stations_of(len(layers))
     through = [
@@ -181,8 +182,8 @@ def ranked(
     times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
 ) -> list[Sequence]:
     """Return the sequences, the best first, without those that became like a better one."""
-    length = Length(weights)
-    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
+    length = JointTravel(weights)
+    sequences = [Sequence(times, q, length.cost_of(q), measure.cost_of(q)) for q in motions]
     selected: list[Sequence] = []
     for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
         if all(unlike(sequence.q, other.q, turning) for other in selected):
@@ -217,12 +218,6 @@ def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
 def _distance(q: Array, other: Array, turning: Flags) -> Array:
     """Return the largest difference of any joint, (…,)."""
     return np.asarray(np.abs(unturned(q - other, turning)).max(axis=-1))
-
-
-def unturned(difference: Array, turning: Flags) -> Array:
-    """Return differences (…, n) modulo turns in the joints that turn without end."""
-    turn = 2.0 * np.pi
-    return np.where(turning, difference - turn * np.round(difference / turn), difference)
 
 
 def why_blocked(

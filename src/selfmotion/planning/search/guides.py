@@ -12,7 +12,7 @@ from selfmotion.model.task import log3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.chains import Sequence
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, measure_of
+from selfmotion.planning.search.measures import JointTravel, measure_of
 from selfmotion.planning.search.sampled import sampled_layers
 from selfmotion.planning.search.sequences import Layers, best_sequences, curve_layers
 from selfmotion.planning.search.shortest import Shortest
@@ -125,7 +125,7 @@ def _between(t: Array, q: Array, where: Array) -> Array:
 def asks_length(formulation: Formulation) -> bool:
     """Whether sequences are chosen by their length."""
     t, weights = np.array([0.0, formulation.path.duration]), _weights(formulation)
-    return isinstance(measure_of(formulation, t, weights), Length)
+    return isinstance(measure_of(formulation, t, weights), JointTravel)
 
 
 def has_curves(formulation: Formulation) -> bool:

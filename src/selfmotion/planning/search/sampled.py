@@ -6,7 +6,7 @@ from selfmotion.basics import Array, Ints, Progress, kernel
 from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.search.chains import in_order, stations_of
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length
+from selfmotion.planning.search.measures import JointTravel
 from selfmotion.planning.search.pushing import Pushing
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.starts import spread
@@ -118,7 +118,7 @@ def _layers(
         q, arrived = waypoints.project(guesses, i)
         q = np.concatenate([q[arrived], smooth[i]])
         layers.append(free(q, i))
-        cost, _ = Length(weights).extended(
+        cost, _ = JointTravel(weights).relaxed_layer(
             i - 1, before, cost, layers[-1], largest_step[i - 1], turning
         )
         if not np.any(np.isfinite(cost)):

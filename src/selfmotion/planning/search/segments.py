@@ -8,10 +8,11 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search.chains import best_chains, connected, unturned
+from selfmotion.planning.search.chains import best_chains, connected
 from selfmotion.planning.search.guides import layers_of
+from selfmotion.planning.search.layer_steps import cheapest, near_pairs, unturned
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, cheapest, near_pairs
+from selfmotion.planning.search.measures import JointTravel
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.problem import prescribed_end
@@ -65,13 +66,13 @@ class _Jumps:
             self._most = 0.5 * (max(others, min(jumping)) + others)
         return bool(jumping)
 
-    def extended(
-        self, k: int, length: Length, before: Array, cost: Array, after: Array, turning: Flags
+    def relaxed_layer(
+        self, k: int, length: JointTravel, before: Array, cost: Array, after: Array, turning: Flags
     ) -> tuple[Array, Ints]:
-        """Return `Length.extended` from waypoint k to the next, without steps that jump."""
+        """See `JointTravel.relaxed_layer`; without steps that jump."""
         step = self._most * self._steps[k]
         if k not in self._at:
-            return length.extended(k, before, cost, after, step, turning)
+            return length.relaxed_layer(k, before, cost, after, step, turning)
         first, second = self._taken(k, before, after, turning)
         moved = unturned(after[second] - before[first], turning)
         price = np.abs(moved) @ length.weights
@@ -258,20 +259,20 @@ class ChainSegments:
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
     ) -> list[tuple[int, list[int]]]:
         """Return the first waypoint of each chain, and its vertices, first to last."""
-        length, turning = Length(self.formulation.coordinates.weights), bounds.turning
+        length, turning = JointTravel(self.formulation.coordinates.weights), bounds.turning
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
         parents: list[Ints] = [np.arange(len(cost))]
         # From which vertex of its own waypoint a vertex is changed to; itself where it is not.
         changes: list[Ints] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
-            cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
+            cost, parent = self._jumps.relaxed_layer(i - 1, length, before, cost, after, turning)
             if not np.any(np.isfinite(cost)):
                 raise self._refused(i, self._layers.why(i, before, after, bounds))
             parents.append(parent)
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
-                changed, source = length.extended(i, after, cost, after, anywhere, turning)
+                changed, source = length.relaxed_layer(i, after, cost, after, anywhere, turning)
                 better = changed + _BREAK < cost
                 change = np.where(better, source, change)
                 cost = np.where(better, changed + _BREAK, cost)

@@ -23,7 +23,7 @@ from selfmotion.planning.search.chains import (
 )
 from selfmotion.planning.search.curves import SPACING, CurveSet, SelfMotion, curves_along
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, Measure, RunningCost
+from selfmotion.planning.search.measures import JointTravel, Measure, RunningCost
 from selfmotion.planning.search.shortest import improved_by
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
 from selfmotion.planning.search.vertices import Admissible, place_vertices
@@ -147,7 +147,7 @@ def best_sequences(
     rough, turning, measure = _rough_motions(layers, given)
     better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
     stages = [("search: optimising finalist", False)]
-    if isinstance(measure, Length):
+    if isinstance(measure, JointTravel):
         # Lengths of chains predict those of the shortest ones nearby badly; a rough stage does it
         # well.
         stages.insert(0, ("search: optimising sequence", True))
@@ -170,7 +170,11 @@ def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array]
     as a whole; if it does not fit, the search is repeated with all turns of these joints.
     """
     bounds = vertices.bounds
-    length = given if isinstance(given, Length) else Length(vertices.waypoints.coordinates.weights)
+    length = (
+        given
+        if isinstance(given, JointTravel)
+        else JointTravel(vertices.waypoints.coordinates.weights)
+    )
     any_turn = bounds.without_turns()
     while True:
         layers, turning = [any_turn.layer(q) for q in vertices.samples], any_turn.turning
@@ -182,7 +186,7 @@ def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array]
         measure: Measure = length
         if isinstance(given, RunningCost):
             shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
-            measure = given.at_pace_of(connected(layers, shortest, turning))
+            measure = given.with_speed_of(connected(layers, shortest, turning))
             chains = best_chains(layers, vertices.steps, turning, measure)
         found = diverse_chains(layers, chains, vertices.steps, turning, _CANDIDATES, measure)
         rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]

@@ -17,7 +17,7 @@ from selfmotion.model.collision import ClearanceModel, CollisionModel
 from selfmotion.planning.optimise import Banded
 from selfmotion.planning.search.chains import best_chains, connected, in_order
 from selfmotion.planning.search.manifold import LONGEST_CORRECTION, OnPath
-from selfmotion.planning.search.measures import Length, Measure
+from selfmotion.planning.search.measures import JointTravel, Measure
 from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
 
 # δ of the stages, as multiples of the chain's mean step.
@@ -267,7 +267,7 @@ def improved_by(
     have to be near enough.
     """
     arguments = waypoints, bounds, largest_step, measure
-    if not isinstance(measure, Length):
+    if not isinstance(measure, JointTravel):
         return lambda q, _: _cheaper(*arguments, q, _ROUGH_RINGS, _ROUGH_SIDE)
     shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
 
@@ -291,7 +291,7 @@ def _cheaper(
 ) -> Array:
     """Return a cheaper chain by dynamic programming over samples around q (W, n), ever nearer."""
     fixed = np.zeros(q.shape[1], dtype=bool)
-    cost = measure.of(q)
+    cost = measure.cost_of(q)
     for ring in rings:
         for _ in range(_ROUNDS):
             layers = _around(waypoints, bounds, q, ring * np.arange(1.0, side + 1.0))
