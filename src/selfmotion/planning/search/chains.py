@@ -12,7 +12,7 @@ from selfmotion.model.collision import Closest, CollisionModel
 from selfmotion.planning.search.curves import CurveSet, SelfMotion
 from selfmotion.planning.search.layer_steps import unturned
 from selfmotion.planning.search.measures import JointTravel, Measure
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.search_bounds import SearchBounds
 
 # Intervals of the spline that smooths a chain, per interval of the chain.
 _SMOOTHING = 3
@@ -226,7 +226,7 @@ def why_blocked(
     curves: CurveSet,
     alive: Array,
     vertices: Array,
-    bounds: Admissible,
+    bounds: SearchBounds,
     largest_step: Array,
 ) -> str:
     """Return why no chain reaches a waypoint.
@@ -242,7 +242,7 @@ def why_blocked(
         Vertices of the waypoint before that chains reach; empty at the first waypoint.
     vertices : (N, n)
         Vertices at the waypoint.
-    bounds : Admissible
+    bounds : SearchBounds
     largest_step : (n,)
     """
     if not curves.curves:
@@ -252,7 +252,7 @@ def why_blocked(
         return f"of all configurations there, {_refusals(samples, bounds, motion)}"
     continued, arrived = motion.project_all(alive, target)
     ending = continued[arrived]
-    ending = ending[~bounds.free(ending)]
+    ending = ending[~bounds.is_admissible_modulo_turns(ending)]
     step = _step(alive, vertices, bounds, largest_step, motion)
     if not len(ending):
         return step
@@ -263,7 +263,7 @@ def why_blocked(
     )
 
 
-def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
+def _refusals(samples: Array, bounds: SearchBounds, motion: SelfMotion) -> str:
     """Return in words what excludes configurations: the joint or pair nearest to being allowed."""
     excess = bounds.excess(samples)
     outside = excess.max(axis=1) > 0.0
@@ -297,10 +297,10 @@ def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
 
 
 def _step(
-    alive: Array, vertices: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
+    alive: Array, vertices: Array, bounds: SearchBounds, largest_step: Array, motion: SelfMotion
 ) -> str:
     """Name the joint whose step limit keeps the nearest vertex away."""
-    steps = np.abs(unturned(vertices[None] - alive[:, None], bounds.turning))
+    steps = np.abs(unturned(vertices[None] - alive[:, None], bounds.is_unbounded))
     ratios = (steps / largest_step).max(axis=-1)
     a, b = np.unravel_index(int(np.argmin(ratios)), ratios.shape)
     k = int(np.argmax(steps[a, b] / largest_step))
