@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.follow import completed, only_tip
+from selfmotion.model.follow import completed, single_tip
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times
@@ -100,7 +100,7 @@ def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     assert np.flatnonzero(moved).tolist() == [16]
     assert t[16] < where[16] < t[17]
     for time, here in zip(where, q, strict=True):
-        assert only_tip(problem.follows).miss(problem.path.pose(float(time)), here)[0] < 1e-9
+        assert single_tip(problem.follows).miss(problem.path.pose(float(time)), here)[0] < 1e-9
 
 
 def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotModel) -> None:

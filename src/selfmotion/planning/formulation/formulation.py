@@ -16,7 +16,7 @@ from selfmotion.model.follow import (
     completed,
     completed_along,
     has_windows,
-    null_basis_at,
+    null_basis,
     windows_shut,
     with_tolerances,
 )
@@ -340,7 +340,7 @@ def _end(formulation: Formulation, item: EndCondition, start: Array, end: Array)
         at = target = completed(formulation.follows, np.array([time]), target[None])[0]
     elif target is not None:
         target = np.append(target, np.zeros(formulation.follows.dof - len(target)))
-    return BoundEnd.of(item, target, null_basis_at(formulation.follows, at))
+    return BoundEnd.of(item, target, null_basis(formulation.follows, at))
 
 
 def _with_virtual(formulation: Formulation, own: Envelope) -> Envelope:

@@ -6,7 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, InverseKinematicsError
-from selfmotion.model.follow import Coordinates, Follows, has_windows, is_plain, only_tip, tip_names
+from selfmotion.model.follow import (
+    Coordinates,
+    Follows,
+    has_windows,
+    is_plain,
+    single_tip,
+    tip_names,
+)
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold, carry
@@ -85,7 +92,7 @@ def start_candidates(
         # Many more attempts, and an error that names the distance.
         found = [
             follows.robot.inverse_kinematics(
-                only_tip(follows).path.pose(time), only_tip(follows).task, rng=rng
+                single_tip(follows).path.pose(time), single_tip(follows).task, rng=rng
             )
         ]
     return found
