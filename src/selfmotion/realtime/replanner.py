@@ -31,7 +31,7 @@ from selfmotion.realtime.checks import (
     measured_state,
     observed_target,
 )
-from selfmotion.realtime.chunks import Chunk, joined
+from selfmotion.realtime.chunks import Chunk, blend
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import (
     Commands,
@@ -299,7 +299,7 @@ class Replanner:
         Both may be anything: their exceptions must not leave the arm without a command.
         """
         try:
-            return joined(self._path.followed, chunk, t, self._approach)
+            return blend(self._path.followed, chunk, t, self._approach)
         except Exception as error:
             reasons.append(f"the chunk is not joined: {type(error).__name__}: {error}")
             return chunk
