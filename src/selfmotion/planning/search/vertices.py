@@ -100,17 +100,17 @@ class _Sampler:
         """Return admissible samples (K, n) nearer to the ends of admissible intervals."""
         curve, inside, outside = _interval_brackets(samples, admissible, self.curves)
         lengths = np.array([each.length for each in self.curves.curves])
-        found: list[Array] = []
+        ends: list[Array] = []
         while True:
             wide = np.abs(outside - inside) > _END_RESOLUTION * self.spacing
             curve, inside, outside = curve[wide], inside[wide], outside[wide]
             if not len(curve):
-                return found
+                return ends
             middle = 0.5 * (inside + outside)
             guess = self.curves.at(curve, middle % lengths[curve])
             q, accepted = self.motion.project_all(guess, self.target)
             accepted[accepted] = self.bounds.is_admissible_modulo_turns(q[accepted])
-            found.append(q[accepted])
+            ends.append(q[accepted])
             inside = np.where(accepted, middle, inside)
             outside = np.where(accepted, outside, middle)
 
