@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import selfmotion as sm
 from selfmotion.certificate import deviation_from
 from selfmotion.certificate.path_error import smallest_singular_values
-from selfmotion.model.follow import only_tip
+from selfmotion.model.follow import single_tip
 from support.scenes import Scene, among_plates, carrying, near_limits, seams
 
 REPEATS = 9
@@ -57,7 +57,7 @@ def plain_check(plan: sm.Plan, model: sm.obstacles.CollisionModel | None) -> tup
     t = np.append((motion.t[:-1, None] + np.diff(motion.t)[:, None] * shares).ravel(), motion.t[-1])
     q, qd = motion(t), motion(t, order=1)
     follows = plan.problem.follows
-    miss = deviation_from(only_tip(follows), t, q, False)
+    miss = deviation_from(single_tip(follows), t, q, False)
     found = [float(np.linalg.norm(part, axis=1).max()) for part in (miss[:, :3], miss[:, 3:])]
     found += [float(np.minimum(q - robot.lower, robot.upper - q).min())]
     found += [float((np.abs(qd) / robot.velocity_limit).max())]

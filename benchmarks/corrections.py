@@ -21,7 +21,7 @@ import selfmotion as sm
 from margins import ARMS, random_plan
 from selfmotion.problem.problem import start_on_path
 from selfmotion.work.placement import Tried
-from selfmotion.work.placement.corners import _difference, _fixed_obstacles
+from selfmotion.work.placement.correction_range import _difference, _fixed_obstacles
 from selfmotion.work.placement.places import COORDINATES, Places, places_of
 
 # No larger corrections are looked at [m], [rad].

@@ -1,6 +1,6 @@
-"""Other works' methods.
+"""Baselines: other authors' methods of redundancy resolution, for comparison.
 
-A door: what it names is made in `selfmotion.paper.baselines`.
+Re-exports `selfmotion.paper.baselines`.
 """
 
 from selfmotion.paper.baselines import *  # noqa: F403

@@ -113,5 +113,5 @@ def test_the_lagrangian_method_refuses_what_it_cannot_solve() -> None:
         sm.sample_problem(),
         sm.baselines.GradientProjection(sm.costs.JointVelocity(), gain=1.0),
     )
-    with pytest.raises(sm.errors.ProblemError, match="does not depend on the pose"):
+    with pytest.raises(sm.errors.ProblemError, match="does not depend on the configuration"):
         sm.plan_by(problem, climb)

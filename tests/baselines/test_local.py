@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.paper.baselines.local import pose_gradient
+from selfmotion.paper.baselines.local import configuration_gradient
 
 Circle = Callable[..., sm.Problem]
 
@@ -39,10 +39,12 @@ def test_gradient_projection_tunes_its_gain() -> None:
         assert tuned.report.cost <= fixed.report.cost + 1e-6
 
 
-def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: Circle) -> None:
+def test_configuration_gradient_is_that_of_the_cost(
+    panda: sm.RobotModel, panda_circle: Circle
+) -> None:
     problem = panda_circle("pose")
     q = problem.given_start
-    found = pose_gradient(problem, sm.costs.Manipulability(), 0.0, q)
+    found = configuration_gradient(problem, sm.costs.Manipulability(), 0.0, q)
 
     def negative_w(q: np.ndarray) -> float:
         jacobian = panda.task_jacobian(q, problem.task)
@@ -71,8 +73,8 @@ def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> No
     assert found.certificate.verified
     q = found.trajectory.q[-1]
     null = np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[2][6:]
-    slope = pose_gradient(problem, sm.costs.Manipulability(), 0.0, q)
-    start = pose_gradient(problem, sm.costs.Manipulability(), 0.0, problem.given_start)
+    slope = configuration_gradient(problem, sm.costs.Manipulability(), 0.0, q)
+    start = configuration_gradient(problem, sm.costs.Manipulability(), 0.0, problem.given_start)
     assert np.abs(null @ slope).max() < 1e-6 * np.linalg.norm(start)
 
 

@@ -22,7 +22,7 @@ from selfmotion.certificate.path_error import (
     poses,
     rotation_vectors,
 )
-from selfmotion.model.follow import Follows, only_tip
+from selfmotion.model.follow import Follows, single_tip
 from selfmotion.planning.formulation import Formulation, path_errors
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
@@ -31,7 +31,7 @@ ROUNDING = 1e-12
 
 
 def errors_of(path: sm.paths.Path, task: sm.Task, robot: sm.RobotModel, *given: Any) -> PathCheck:
-    return bound_errors(robot, only_tip(Follows.of(robot, path, task)), *given)
+    return bound_errors(robot, single_tip(Follows.of(robot, path, task)), *given)
 
 
 def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:

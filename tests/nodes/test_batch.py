@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.model.follow import null_basis_at
+from selfmotion.model.follow import null_basis
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, Step, batch, minimise
 from selfmotion.planning.nodes.motion import stepped
@@ -33,7 +33,7 @@ def motions_of(problem: sm.Problem, count: int = 4, size: float = 0.15) -> Array
     rng = np.random.default_rng(3)
     found = []
     for _ in range(count):
-        null = null_basis_at(problem.follows, start)
+        null = null_basis(problem.follows, start)
         q = start + null @ rng.normal(scale=size, size=null.shape[1])
         found.append(np.tile(q, (INTERVALS + 1, 1)))
     assert robot.dof == found[0].shape[1]

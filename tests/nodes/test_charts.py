@@ -3,7 +3,7 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.model.follow import null_basis_at
+from selfmotion.model.follow import null_basis
 from selfmotion.planning.nodes import null_motion_of
 from support.arms import Case, robot_named, start_of
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
@@ -138,7 +138,7 @@ def test_from_rest_to_rest_where_no_time_is_given() -> None:
     start = start_of(robot, "planar")
     still = sm.paths.Dwell(robot.pose(start), 2.0)
     grid = nodes_of(problem_of((robot, sm.Task.PLANAR, start, still)), 40).grid
-    wanted = start + 0.01 * null_basis_at(grid.formulation.follows, start)[:, 0]
+    wanted = start + 0.01 * null_basis(grid.formulation.follows, start)[:, 0]
     motion = grid.motion_towards(start, wanted)
     assert motion is not None
     u = grid.t / grid.t[-1]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow import null_basis_at
+from selfmotion.model.follow import null_basis
 from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.nodes import Step, minimise
 from selfmotion.planning.nodes.ends import NodeEnds
@@ -106,7 +106,7 @@ def test_a_given_end_is_reached_on_nodes(panda: sm.RobotModel) -> None:
     """The end of the open motion turned along its self-motion."""
     problem = circle(panda, rest=True)
     end = sm.plan(problem).trajectory.q[-1]
-    turned = end + 0.2 * null_basis_at(problem.follows, end)[:, 0]
+    turned = end + 0.2 * null_basis(problem.follows, end)[:, 0]
     pose = problem.path.pose(problem.path.duration)
     last = panda.inverse_kinematics(pose, "pose", seed=turned)
     assert np.abs(last - end).max() > 0.05
@@ -124,7 +124,7 @@ def test_a_given_acceleration_at_an_end_is_met_on_nodes(
     problem = circle(panda)
     free = sm.plan(problem).trajectory
     end = 0 if at_start else -1
-    null = null_basis_at(problem.follows, free.q[end])[:, 0]
+    null = null_basis(problem.follows, free.q[end])[:, 0]
     wanted = free.qdd[end] + 0.4 * null
     kind = sm.constraints.StartAcceleration if at_start else sm.constraints.EndAcceleration
     rates = (

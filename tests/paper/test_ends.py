@@ -11,11 +11,12 @@ from selfmotion.basics import Array
 from selfmotion.model.motion import PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.optimise import inverse_metric
-from selfmotion.planning.paper import Eliminated, Solution, closed, solve
+from selfmotion.planning.paper import Eliminated, PublishedMotion, closed
 from selfmotion.planning.paper.ends import from_unknowns, to_unknowns
 from selfmotion.planning.paper.objective import residual_tangents, residuals, unmet
 from selfmotion.planning.rollout import FreeStart, converged_minimum_norm
 from support.arms import PANDA_HOME, central_difference, robot_named
+from support.published_method import solve
 
 # Exact gradients against extrapolated differences, relative to the largest entry.
 GRADIENT = 1e-7
@@ -52,7 +53,7 @@ def problem_of(name: str) -> sm.Problem:
 
 def solved(
     name: str, asked: list[sm.constraints.Constraint], *, free: bool = False, **options
-) -> Solution:
+) -> PublishedMotion:
     problem = problem_of(name)
     formulation = Formulation.of(problem)
     minimum_norm, _ = converged_minimum_norm(formulation, np.array(problem.given_start))
@@ -61,7 +62,7 @@ def solved(
     return solve(formulation, minimum_norm, ends=ends, free=free, **options)
 
 
-def eliminated(found: Solution) -> Eliminated:
+def eliminated(found: PublishedMotion) -> Eliminated:
     """Return the unknowns around x = 0 on a solution's grid, whose motion misses the ends."""
     return Eliminated(found.objective, np.zeros_like(found.x))
 
@@ -126,12 +127,12 @@ def test_ends_are_met_to_rounding_on_any_grid(name: str, asked: str) -> None:
     found = solved(name, CLOSED_PATHS[asked])
     assert found.unmet == ()
     finer = found.refined(np.arange(found.steps) % 3 == 0).refined()
-    for solution in (found, finer, finer.again()):
+    for solution in (found, finer, finer.optimised()):
         assert np.abs(residuals(solution.objective, solution.x)).max() <= CLOSED
     assert finer.steps > 2 * found.steps
 
 
-def null_motion_metric(found: Solution) -> Array:
+def null_motion_metric(found: PublishedMotion) -> Array:
     """Return ∫ (∂ε/∂x)ᵀ (∂ε/∂x) dt, (size, size)."""
     matrix = found.objective.null_motion.matrix()
     return np.einsum("s,sid,sie->de", found.objective.grid.weights, matrix, matrix)
@@ -217,7 +218,7 @@ def test_ends_that_contradict_each_other_are_named() -> None:
     assert found.status is sm.optimise.Status.INFEASIBLE
     assert [text.split(":")[0] for text in found.unmet] == ["end configuration", "closed path"]
     # The nearest motion is one, all the same.
-    assert np.isfinite(found.refined().again().cost)
+    assert np.isfinite(found.refined().optimised().cost)
 
 
 def test_an_end_that_is_missed_is_named_on_either_side() -> None:

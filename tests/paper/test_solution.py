@@ -12,10 +12,11 @@ from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
 from selfmotion.planning.formulation import Formulation, bound_conditions
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
-from selfmotion.planning.paper import Solution, solve
+from selfmotion.planning.paper import PublishedMotion
 from selfmotion.planning.rollout import MinimumNormMotion, converged_minimum_norm
 from selfmotion.problem.constraints import BoundEnd
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
+from support.published_method import solve
 
 # The notes' costs are of a fine integration, and of optima that steps of 1e-8 of it end at: here
 # the cost on a grid agrees with that on the halved one to this share.
@@ -28,11 +29,11 @@ def still_of(problem: sm.Problem) -> MinimumNormMotion:
     return converged_minimum_norm(Formulation.of(problem), np.array(problem.given_start))[0]
 
 
-def solved(problem: sm.Problem, **options) -> Solution:
+def solved(problem: sm.Problem, **options) -> PublishedMotion:
     return solve(Formulation.of(problem), still_of(problem), **options)
 
 
-def closed_circle(**options) -> Solution:
+def closed_circle(**options) -> PublishedMotion:
     robot = robot_named("panda")
     circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     cubic = PolynomialNullMotion()
@@ -97,7 +98,7 @@ def test_the_cost_agrees_with_that_on_a_finer_grid() -> None:
         finer = found.refined()
         assert finer.steps == 2 * found.steps
         assert finer.cost == pytest.approx(found.cost, rel=AGREEMENT)
-        again = finer.again()
+        again = finer.optimised()
         assert again.cost <= finer.cost
         # The inverse Hessian is known: nothing is left to learn.
         assert len(again.history) <= len(found.history) + 3
@@ -263,7 +264,7 @@ def test_without_coefficients_there_is_nothing_to_optimise(
     assert found.status is (Status.INFEASIBLE if found.unmet else Status.CONVERGED)
     assert found.coefficients.shape == (0,)
     assert found.evaluation.cost == found.cost
-    assert found.refined().again().status is found.status
+    assert found.refined().optimised().status is found.status
 
 
 def edge(radius: float, damping: sm.Damping | None) -> sm.Problem:

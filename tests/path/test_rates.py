@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.path import edges_of, spread_along, twist_rates
-from selfmotion.problem.problem import length_of, rest_orders
+from selfmotion.model.path import edges_of, path_length, spread_along, twist_rates
+from selfmotion.problem.problem import rest_orders
 from support.paths import pose, random_waypoints
 
 # Of the largest acceleration: times are rounded by 1e-16 of a path that lasts 1e7 times as long as
@@ -100,7 +100,7 @@ def test_looks_see_what_is_short(before: float, after: float) -> None:
     assert np.sum((t >= before) & (t <= before + 2.0)) >= 41 // 6
     assert np.diff(t).max() <= 2.0 * path.duration / 40 * (1.0 + 1e-9)
     # Three times round: the sides of the polygon are shorter by less than a tenth.
-    assert 0.9 * 3.0 * 2.0 * np.pi * 0.05 < length_of(path) < 3.0 * 2.0 * np.pi * 0.05 * 1.001
+    assert 0.9 * 3.0 * 2.0 * np.pi * 0.05 < path_length(path) < 3.0 * 2.0 * np.pi * 0.05 * 1.001
 
 
 def test_looks_are_even_where_nothing_waits() -> None:

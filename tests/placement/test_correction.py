@@ -1,4 +1,4 @@
-"""Corrections: what is claimed was planned again, and no more."""
+"""Corrections: what is claimed was replanned, and no more."""
 
 import numpy as np
 import pinocchio as pin
@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import selfmotion as sm
-from selfmotion.work.placement import Tried, corners
+from selfmotion.work.placement import Tried, correction_range
 from selfmotion.work.placement.places import Places
 from support.arms import robot_named
 from support.shell import invoke
@@ -68,8 +68,10 @@ def test_the_room_of_joints_is_the_least_along_the_motion(plan: sm.Plan) -> None
         part, base = (
             Places((problem,), of, frozenset(), np.zeros(3), ("x", "y")) for of in ("part", "base")
         )
-        room = corners._room(part, plan, way)
-        assert corners._room(base, plan, -way) == pytest.approx(room, rel=1e-4)
+        room = correction_range._first_order_range(part, plan, way)
+        assert correction_range._first_order_range(base, plan, -way) == pytest.approx(
+            room, rel=1e-4
+        )
         least = np.inf
         for q in plan.trajectory(np.linspace(0.0, 2.0, 41)):
             jacobian = problem.robot.jacobian(q)[:2]
@@ -104,7 +106,7 @@ def test_a_corner_that_fails_is_not_claimed(plan: sm.Plan, monkeypatch: pytest.M
     # Those towards -y and into the octants there.
     assert 0.009 < found.translation.corners[0].size <= 0.01
     assert "-y" in found.translation.stops.split(" by ")[0]
-    monkeypatch.setattr(corners, "NEAR", 1e-9)
+    monkeypatch.setattr(correction_range, "_MAX_JOINT_CHANGE", 1e-9)
     none = sm.correction(plan, farthest=0.05, most_turned=0.01)
     assert none.translation.size == 0.0
     assert not none.translation.corners
@@ -130,7 +132,7 @@ def test_where_the_base_carries_the_path_the_part_is_corrected(tmp_path) -> None
     sm.plan(sm.Problem(arm, circle, "position", constraints=LIMITS)).save(file)
     code, told = invoke("margin", file, "--tolerance", "1e-3", "--turn", "0.1", "--corrected")
     assert code == 0, told
-    assert "planned again, the part may be" in told
+    assert "if replanned, the part may be" in told
     assert "not planned again for another place of the base: " in told
     assert "which moves along with the base" in told
 

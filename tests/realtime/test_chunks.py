@@ -10,7 +10,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.task import SE3
 from selfmotion.realtime import Approach, Blended, Chunk, Flag, MovingPose, Replanner, Segment
-from selfmotion.realtime.chunks import joined
+from selfmotion.realtime.chunks import blend
 from selfmotion.shell.testing import check_path
 from support.arms import PANDA_HOME, robot_named
 
@@ -58,7 +58,7 @@ def accelerations(path: sm.paths.Path, t: Array) -> Array:
 def two_chunks(begins: float | None = None) -> tuple[Chunk, Chunk, Blended]:
     rng = np.random.default_rng(1)
     first, second = (Chunk.of(*told(t, rng, at)) for t, at in ((0.5, None), (0.9, begins)))
-    found = joined(first, second, 0.9, Approach())
+    found = blend(first, second, 0.9, Approach())
     assert isinstance(found, Blended)
     return first, second, found
 
@@ -105,7 +105,7 @@ def test_the_old_one_holds_until_the_join_and_the_new_one_from_its_end() -> None
         assert np.abs(found.samples(t).twist - path.samples(t).twist).max() <= 1e-9
     # One that is told before that join takes the place of the one that waits.
     third = Chunk.of(*told(1.0, np.random.default_rng(5)))
-    again = joined(found, third, 1.0, Approach())
+    again = blend(found, third, 1.0, Approach())
     assert isinstance(again, Blended)
     assert again.before is None
     here = np.array([1.0])
@@ -119,13 +119,13 @@ def test_the_offset_fades_within_the_limits_of_the_approach() -> None:
     times, poses = told(0.9, rng)
     shift = np.array([0.05, 0.0, 0.0])
     moved = [SE3(pose.rotation, pose.translation + shift) for pose in poses]
-    found = joined(first, Chunk.of(times, moved), 0.9, approach)
+    found = blend(first, Chunk.of(times, moved), 0.9, approach)
     t = np.linspace(found.at, found.at + found.window, 400)
     off = found.samples(t).twist - found.after.samples(t).twist
     assert np.linalg.norm(off[:, :3], axis=1).max() <= 0.2
     change = np.diff(off[:, :3], axis=0) / np.diff(t)[:, None]
     assert np.linalg.norm(change, axis=1).max() <= 1.05
-    assert joined(first, second, 0.9, Approach()).window < found.window
+    assert blend(first, second, 0.9, Approach()).window < found.window
 
 
 # In the loop.

@@ -8,7 +8,7 @@ import pytest
 from selfmotion.basics import Array
 from selfmotion.planning.search import Sequence
 from selfmotion.planning.search.chains import UNLIKE, best_chains, connected, diverse_chains, unlike
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.search_bounds import SearchBounds
 
 
 def brute_force(layers: list[Array], step: Array) -> float:
@@ -50,12 +50,16 @@ def test_angles_of_turning_joints_count_modulo_turns() -> None:
 
 
 def test_bounds_count_every_turn() -> None:
-    bounds = Admissible(np.array([-7.0]), np.array([7.0]), np.array([True]), ())
+    bounds = SearchBounds(np.array([-7.0]), np.array([7.0]), np.array([True]), ())
     assert sorted(bounds.all_turns(np.array([[0.5]]))[:, 0]) == pytest.approx(
         [0.5 - 2 * np.pi, 0.5, 0.5 + 2 * np.pi]
     )
-    narrow = Admissible(np.array([-1.0]), np.array([1.0]), np.array([True]), ())
-    assert list(narrow.free(np.array([[0.9], [1.1], [0.9 - 4 * np.pi]]))) == [True, False, True]
+    narrow = SearchBounds(np.array([-1.0]), np.array([1.0]), np.array([True]), ())
+    assert list(narrow.is_admissible_modulo_turns(np.array([[0.9], [1.1], [0.9 - 4 * np.pi]]))) == [
+        True,
+        False,
+        True,
+    ]
     assert narrow.excess(np.array([[1.2], [-1.3], [0.3]]))[:, 0] == pytest.approx([0.2, 0.3, 0.0])
 
 

@@ -8,13 +8,13 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.follow import completed, only_tip
+from selfmotion.model.follow import completed, single_tip
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times
 from selfmotion.planning.search.manifold import OnPath
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.shortest import Shortest
-from selfmotion.planning.search.vertices import Admissible
 from support.arms import PANDA_HOME
 from support.stretching import DURATION, rounded_problem, stretching
 
@@ -67,10 +67,10 @@ def test_chains_keep_a_little_of_limits_and_speeds_for_what_is_between_waypoints
     fastest = 0.7
     limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(fastest)]
     formulation = Formulation.of(sm.Problem(panda, path, constraints=limits, clearance=None))
-    noted: list[tuple[Admissible, Array]] = []
+    noted: list[tuple[SearchBounds, Array]] = []
 
     class Noted(Shortest):
-        def __init__(self, waypoints: OnPath, bounds: Admissible, steps: Array, weights: Array):
+        def __init__(self, waypoints: OnPath, bounds: SearchBounds, steps: Array, weights: Array):
             noted.append((bounds, steps))
             super().__init__(waypoints, bounds, steps, weights)
 
@@ -100,7 +100,7 @@ def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     assert np.flatnonzero(moved).tolist() == [16]
     assert t[16] < where[16] < t[17]
     for time, here in zip(where, q, strict=True):
-        assert only_tip(problem.follows).miss(problem.path.pose(float(time)), here)[0] < 1e-9
+        assert single_tip(problem.follows).miss(problem.path.pose(float(time)), here)[0] < 1e-9
 
 
 def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotModel) -> None:

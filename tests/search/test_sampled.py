@@ -9,8 +9,8 @@ from selfmotion.model.follow import Follows
 from selfmotion.planning.search import Manifold
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.sampled import _STARTS, _starts, sampled_layers
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.sequences import best_sequences
-from selfmotion.planning.search.vertices import Admissible
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of
@@ -74,7 +74,7 @@ def test_a_quarter_of_what_is_drawn_anywhere_comes_onto_the_path(name: str, task
     robot = robot_named(name)
     path, limits = line_of(robot, task), (robot.lower, robot.upper)
     waypoints = OnPath(Follows.of(robot, path, task), np.array([0.0, 1.0, 2.0]), *limits)
-    bounds = Admissible(*limits, robot.is_revolute, ())
+    bounds = SearchBounds(*limits, robot.is_revolute, ())
     found = _starts(waypoints, bounds, 1, np.random.default_rng(0))
     assert len(found) == _STARTS
     for q in found:
@@ -120,7 +120,7 @@ def test_joints_that_stand_at_their_limits_are_nodes_within_these() -> None:
     rng = np.random.default_rng(0)
     lower = -rng.uniform(0.1, 3.0, 5000)
     upper = rng.uniform(0.1, 3.0, 5000)
-    bounds = Admissible(lower, upper, np.ones(5000, dtype=bool), ())
+    bounds = SearchBounds(lower, upper, np.ones(5000, dtype=bool), ())
     # A turn there and back rounds some of them beyond.
     assert (bounds.representative(upper) > upper).any()
     nodes = bounds.layer(np.stack([lower, upper]))

@@ -11,9 +11,9 @@ from selfmotion.model.follow import Follows
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import shortest
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, RunningCost
+from selfmotion.planning.search.measures import JointTravel, RunningCost
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.shortest import Shortest, improved_by
-from selfmotion.planning.search.vertices import Admissible
 from support.arms import robot_named
 from support.paths import line_of
 
@@ -41,11 +41,11 @@ class Chain:
             found.append(q[0])
         self.q = np.array(found)
 
-    def kept(self, *bodies: tuple[sm.obstacles.CollisionModel, float]) -> Admissible:
+    def kept(self, *bodies: tuple[sm.obstacles.CollisionModel, float]) -> SearchBounds:
         """Return what its configurations have to keep."""
-        return Admissible(self.robot.lower, self.robot.upper, self.robot.is_revolute, bodies)
+        return SearchBounds(self.robot.lower, self.robot.upper, self.robot.is_revolute, bodies)
 
-    def shortest(self, kept: Admissible) -> Array:
+    def shortest(self, kept: SearchBounds) -> Array:
         """Return what comes of it."""
         steps = np.full((COUNT - 1, self.robot.dof), 0.5)
         return Shortest(self.waypoints, kept, steps, self.robot.joint_weights).near(self.q)
@@ -62,7 +62,7 @@ def test_chains_become_shorter_on_their_path_until_nothing_shortens_them(name: s
     for t, q in zip(chain.t, shorter, strict=True):
         pose = chain.path.pose(float(t))
         assert max(sm.Task.POSITION.miss(pose, chain.robot.pose(q))) < ON_PATH
-    assert chain.kept().keep(shorter).all()
+    assert chain.kept().is_admissible(shorter).all()
     # Wherever it is pushed along the self-motion, all of it or a stretch, that is no gain.
     rng, bases = np.random.default_rng(1), chain.waypoints.bases(shorter)
     every = np.arange(COUNT)
@@ -87,14 +87,14 @@ def test_it_goes_round_what_the_chain_kept_clear_of() -> None:
     )
     kept = chain.kept((model, 1e-3))
     # A ball that the shortest chain of all meets, and the given one does not.
-    assert kept.keep(chain.q).all()
-    assert not kept.keep(free).all()
+    assert kept.is_admissible(chain.q).all()
+    assert not kept.is_admissible(free).all()
     shorter = chain.shortest(kept)
-    assert kept.keep(shorter).all()
+    assert kept.is_admissible(shorter).all()
     assert chain.length(shorter) < 0.8 * chain.length(chain.q)
 
 
-def best_of(chain: Chain, measure: Length | RunningCost) -> Callable[[Array, bool], Array]:
+def best_of(chain: Chain, measure: JointTravel | RunningCost) -> Callable[[Array, bool], Array]:
     steps = np.full((COUNT - 1, chain.robot.dof), 0.5)
     return improved_by(chain.waypoints, chain.kept(), steps, measure)
 
@@ -103,7 +103,7 @@ def best_of(chain: Chain, measure: Length | RunningCost) -> Callable[[Array, boo
 def test_along_curves_samples_lead_on_from_what_moving_aside_finds(name: str, task: str) -> None:
     """With more freedom they are too many: what moves aside is the last word, as it is roughly."""
     chain = Chain(name, task)
-    measure = Length(chain.robot.joint_weights)
+    measure = JointTravel(chain.robot.joint_weights)
     better = best_of(chain, measure)
     aside, whole = chain.shortest(chain.kept()), better(chain.q, False)
     if chain.waypoints.redundancy > 1:
@@ -117,15 +117,15 @@ def test_what_costs_more_than_its_length_becomes_cheaper() -> None:
     chain = Chain("panda", "pose")
     costs = [sm.costs.JointVelocity(), sm.costs.InverseManipulability(1e-3)]
     problem = sm.Problem(chain.robot, chain.path, costs=costs, clearance=None)
-    measure = RunningCost.by(Formulation.of(problem), chain.t)
+    measure = RunningCost.of(Formulation.of(problem), chain.t)
     found = best_of(chain, measure)(chain.q, False)
-    assert measure.of(found) < 0.9 * measure.of(chain.q)
-    assert chain.kept().keep(found).all()
+    assert measure.cost_of(found) < 0.9 * measure.cost_of(chain.q)
+    assert chain.kept().is_admissible(found).all()
     # Samples around it hold nothing that is much cheaper: rounds end where they gain no more.
     ring = shortest._ROUGH_RINGS[-1]
     steps = np.full((COUNT - 1, chain.robot.dof), 0.5)
     again = shortest._cheaper(
         chain.waypoints, chain.kept(), steps, measure, found, (ring,), shortest._ROUGH_SIDE
     )
-    gain = 1.0 - measure.of(again) / measure.of(found)
+    gain = 1.0 - measure.cost_of(again) / measure.cost_of(found)
     assert 0.0 <= gain <= 2.0 * shortest._GAIN

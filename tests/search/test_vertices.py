@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.planning.search.vertices import _MERGED, Admissible, _between, _thinned
+from selfmotion.planning.search.search_bounds import SearchBounds
+from selfmotion.planning.search.vertices import _MERGED, _gap_fillers, _spaced
 
 SPACING, LENGTH = 0.1, 2.0
 
@@ -20,7 +21,7 @@ def arcs_of(seed: int, count: int) -> Array:
 def test_gaps_are_filled_evenly_and_no_further(seed: int, count: int) -> None:
     """The start of a curve is filled as well, unless a sample is beside it."""
     arcs = arcs_of(seed, count)
-    fill = _between(arcs.tolist(), LENGTH, SPACING)
+    fill = _gap_fillers(arcs.tolist(), LENGTH, SPACING)
     every = np.sort(np.concatenate([arcs, fill, [LENGTH]]))
     steps = np.diff(every)
     # None is there twice, and none is as far from the next one as would fit another in between.
@@ -37,7 +38,7 @@ def test_gaps_are_filled_evenly_and_no_further(seed: int, count: int) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_kept_is_apart_and_near_to_all_that_is_left_out(seed: int) -> None:
     arcs = arcs_of(seed, 60)
-    kept = arcs[_thinned(arcs, SPACING)]
+    kept = arcs[_spaced(arcs, SPACING)]
     assert kept[0] == arcs[0]
     assert np.diff(kept).min() > SPACING
     before = kept[np.searchsorted(kept, arcs, side="right") - 1]
@@ -46,7 +47,7 @@ def test_what_is_kept_is_apart_and_near_to_all_that_is_left_out(seed: int) -> No
 
 def test_all_turns_are_those_within_the_limits() -> None:
     lower, upper = np.array([-7.0, -1.0, -np.inf]), np.array([13.0, 1.0, np.inf])
-    bounds = Admissible(lower, upper, np.array([True, False, True]), ())
+    bounds = SearchBounds(lower, upper, np.array([True, False, True]), ())
     found = bounds.all_turns(np.array([[0.5, 0.3, 9.0]]))
     turns = 0.5 + 2.0 * np.pi * np.arange(-3, 4)
     expected = turns[(turns >= -7.0) & (turns <= 13.0)]

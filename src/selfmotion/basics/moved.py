@@ -49,6 +49,7 @@ MOVED_MODULES = {
     "shop.controllers.read_stretches": "shop.controllers.segment_building",
     "shop.controllers.stretches": "shop.controllers.segments",
     "shop.sheet": "shell.sheet",
+    "work.placement.corners": "work.placement.correction_range",
 }
 
 

@@ -17,7 +17,7 @@ from selfmotion.basics import (
     plain_numbers,
     shown,
 )
-from selfmotion.model.follow import Follows, only_tip
+from selfmotion.model.follow import Follows, single_tip
 from selfmotion.model.motion import NullMotion
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
@@ -49,7 +49,7 @@ def checked_terms(
     ProblemError
         They do not.
     """
-    robot, task = follows.robot, only_tip(follows).task
+    robot, task = follows.robot, single_tip(follows).task
     if not robot.can_follow(task):
         able = [other.value for other in Task if robot.can_follow(other)]
         raise ProblemError(

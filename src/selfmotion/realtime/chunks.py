@@ -1,4 +1,7 @@
-"""Chunks: poses for the next seconds, from a policy or a camera, each joined to the last one."""
+"""Chunks: timed tool poses for the next seconds, from a policy or a camera, and their blends.
+
+A chunk is blended with the path that was followed before.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from selfmotion.basics import Array, PathError, as_numbers, read_only, restore, shown
+from selfmotion.basics import Array, Flags, PathError, as_numbers, read_only, restore, shown
 from selfmotion.model.motion import differentiated, evaluated, hermite
 from selfmotion.model.path import Path, PathSamples, Waypoints, path_pose
-from selfmotion.model.task import SE3, exp3, log3, turning
+from selfmotion.model.task import SE3, exp3, exponentials, log3, products
 from selfmotion.realtime.reference import Approach, left_jacobian, resting
 from selfmotion.realtime.settings import (
     CHUNK_END,
@@ -23,17 +26,20 @@ from selfmotion.realtime.settings import (
     JOIN_SHORTEST,
 )
 
-# Shares of the time of a join at which its rates are held against their limits.
+# Shares of a blend's duration at which its rates are compared with their limits.
 _SHARES = np.linspace(0.0, 1.0, 33)
+# Largest step of the difference at an end, as a share of the chunk's duration.
+_MAX_DIFFERENCE_SHARE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk(Path):
-    """Poses of the tool at times of the loop's clock, for some seconds, with twists inferred.
+    """Timed tool poses on the loop's clock; twists are inferred by interpolation.
 
     Between the poses it is `Waypoints`: positions by a cubic spline, orientations by a rotation
-    spline, both of continuous acceleration. Before the first and after the last pose the tool comes
-    from rest and comes to rest within 0.2 s, on the twist and the acceleration that it has there:
+    spline, both of continuous acceleration. Before the first and after the last pose the tool
+    starts from and comes to rest within E = 0.2 s, continuing with the twist and acceleration at
+    that pose:
 
         p(τ) = p + v f₁(τ) + a f₂(τ),  f₁' = 1 - s(τ/E),  f₂' = τ (1 - s(τ/E)),
 
@@ -42,9 +48,9 @@ class Chunk(Path):
     Parameters
     ----------
     through : Waypoints
-        The poses; its time 0 is that of the first one.
+        Path through the poses; its time 0 is the first pose.
     begins : float
-        When that is, on the clock of the loop [s].
+        Time of the first pose on the loop's clock [s].
     """
 
     through: Waypoints
@@ -57,15 +63,15 @@ class Chunk(Path):
         Parameters
         ----------
         times : (K,)
-            On the clock of the loop [s], increasing; two or more.
+            Times on the clock of the loop [s], increasing; two or more.
         poses : sequence of SE3, or (K, 4, 4)
-            Of the tool, world axes [m].
+            Poses of the tool, world axes [m].
 
         Raises
         ------
         PathError
-            Times do not increase or are no finite numbers, a pose is none, or there is another
-            number of them.
+            Times do not increase or are no finite numbers, a pose is none, or their numbers
+            differ.
         """
         listed: Any = poses
         if not isinstance(listed, Sequence | np.ndarray) or isinstance(listed, str):
@@ -87,7 +93,7 @@ class Chunk(Path):
 
     @property
     def until(self) -> float:
-        """When the last pose is [s]."""
+        """Time of the last pose [s]."""
         return self.begins + self.through.duration
 
     @property
@@ -104,32 +110,39 @@ class Chunk(Path):
 
     @override
     def evaluate(self, t: Array) -> PathSamples:
-        own = t - self.begins
-        inside = np.clip(own, 0.0, self.through.duration)
-        found = self.through.samples(inside)
-        translation, rotation, twist = found.translation, found.rotation, found.twist
-        for at, sign, outside in (
-            (0.0, -1.0, own < 0.0),
-            (self.through.duration, 1.0, own > self.through.duration),
-        ):
-            if not outside.any():
-                continue
-            first, second, slope, bend = _fading(sign * (own[outside] - at))
-            rate, change = self._end(at, sign)
-            way = sign * first[:, None] * rate + second[:, None] * change
-            rates = slope[:, None] * rate + sign * bend[:, None] * change
-            turned, angular = turning(way[:, 3:], rates[:, 3:])
-            translation, rotation, twist = translation.copy(), rotation.copy(), twist.copy()
-            translation[outside] += way[:, :3]
-            rotation[outside] = turned @ rotation[outside]
-            twist[outside] = np.hstack([rates[:, :3], angular])
-        return PathSamples(t, translation, rotation, twist)
+        local = np.clip(t - self.begins, 0.0, self.through.duration)
+        inside = self.through.samples(local)
+        samples = PathSamples(t, inside.translation, inside.rotation, inside.twist)
+        for end, sign in ((0.0, -1.0), (self.through.duration, 1.0)):
+            samples = self._with_rest(samples, end, sign)
+        return samples
 
-    def _end(self, at: float, sign: float) -> tuple[Array, Array]:
-        """Return the twist and its derivative (6,) at an end, by differences to the inside."""
-        h = min(DIFFERENCE, 0.25 * self.through.duration)
-        one, two, three = self.through.samples(at - sign * h * np.arange(3.0)).twist
-        return one, sign * (3.0 * one - 4.0 * two + three) / (2.0 * h)
+    def _with_rest(self, samples: PathSamples, end: float, sign: float) -> PathSamples:
+        """Return samples, with those beyond an end on the motion from or to rest there."""
+        tau = sign * (samples.t - self.begins - end)
+        beyond = tau > 0.0
+        if not beyond.any():
+            return samples
+        f1, f2, f1_rate, f2_rate = (each[:, None] for each in _rest_profile(tau[beyond]))
+        twist, acceleration = self._end_derivatives(end, sign)
+        offset = sign * f1 * twist + f2 * acceleration
+        offset_rate = f1_rate * twist + sign * f2_rate * acceleration
+        standing = PathSamples(
+            samples.t[beyond],
+            samples.translation[beyond],
+            samples.rotation[beyond],
+            np.zeros_like(offset),
+        )
+        return _replaced(samples, beyond, _displaced(standing, offset, offset_rate))
+
+    def _end_derivatives(self, end: float, sign: float) -> tuple[Array, Array]:
+        """Return the twist (6,) at an end, and its derivative.
+
+        By a one-sided difference of second order.
+        """
+        h = min(DIFFERENCE, _MAX_DIFFERENCE_SHARE * self.through.duration)
+        twist, twist_1, twist_2 = self.through.samples(end - sign * h * np.arange(3.0)).twist
+        return twist, sign * (3.0 * twist - 4.0 * twist_1 + twist_2) / (2.0 * h)
 
     @classmethod
     @override
@@ -137,35 +150,57 @@ class Chunk(Path):
         return cls(**{**values, "through": restore(Path, values["through"])})
 
 
-def _fading(tau: Array) -> tuple[Array, Array, Array, Array]:
-    """Return f₁, f₂, f₁' and f₂' at times (K,) beyond an end [s], see `Chunk`."""
+def _rest_profile(tau: Array) -> tuple[Array, Array, Array, Array]:
+    """Return f₁, f₂ and their derivatives at times τ (K,) beyond an end; see `Chunk`."""
     u = np.minimum(tau / CHUNK_END, 1.0)
-    left = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    first = CHUNK_END * (u - u**4 * (2.5 - 3.0 * u + u**2))
-    second = CHUNK_END**2 * u**2 * (0.5 - u**3 * (2.0 - 2.5 * u + 6.0 / 7.0 * u**2))
-    return first, second, left, CHUNK_END * u * left
+    remaining = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    f1 = CHUNK_END * (u - u**4 * (2.5 - 3.0 * u + u**2))
+    f2 = CHUNK_END**2 * u**2 * (0.5 - u**3 * (2.0 - 2.5 * u + 6.0 / 7.0 * u**2))
+    return f1, f2, remaining, CHUNK_END * u * remaining
+
+
+def _displaced(samples: PathSamples, offset: Array, offset_rate: Array) -> PathSamples:
+    """Return samples displaced by an offset (K, 6) with this rate: p + d, exp(φ) R."""
+    rotations, angular = exponentials(offset[:, 3:], offset_rate[:, 3:])
+    linear = samples.twist[:, :3] + offset_rate[:, :3]
+    angular = angular + products(rotations, samples.twist[:, 3:])
+    return PathSamples(
+        samples.t,
+        samples.translation + offset[:, :3],
+        rotations @ samples.rotation,
+        np.hstack([linear, angular]),
+    )
+
+
+def _replaced(samples: PathSamples, where: Flags, others: PathSamples) -> PathSamples:
+    """Return samples with those of a mask (K,) replaced by others."""
+    translation, rotation = samples.translation.copy(), samples.rotation.copy()
+    twist = samples.twist.copy()
+    translation[where], rotation[where] = others.translation, others.rotation
+    twist[where] = others.twist
+    return PathSamples(samples.t, translation, rotation, twist)
 
 
 @dataclass(frozen=True, eq=False)
 class Blended(Path):
-    """A chunk that is joined to what was followed before, without a jump in acceleration.
+    """A chunk blended with the previously followed path, with continuous acceleration.
 
-    Up to `at` it is the path before; from there on the chunk, plus an offset of position and
-    rotation that is, with its first two derivatives, the difference of both paths at `at`, and
-    fades to zero, with both, by a quintic over `window`.
+    Until `at` it is the previous path. From then on it is the chunk plus an offset. The offset and
+    its first two derivatives equal the difference of both paths at `at`, and decay to zero over
+    `window` by a quintic.
 
     Parameters
     ----------
     after : Chunk
     at : float
-        When the join begins [s].
+        Start of the blend [s].
     window : float
-        How long it takes [s].
+        Duration of the blend [s].
     offset : (3, 6)
-        The difference at `at`, of position [m] and as a rotation vector [rad], world axes; its
-        derivative, and the second one.
+        Difference of both paths at `at`, of position [m] and as a rotation vector [rad], world
+        axes; its derivative, and the second one.
     before : Path, optional
-        What is followed up to `at`; None where that is over.
+        The previous path, until `at`; None once the blend has begun.
     """
 
     after: Chunk
@@ -181,7 +216,7 @@ class Blended(Path):
 
     @property
     def until(self) -> float:
-        """When the last pose of the chunk is [s]."""
+        """Time of the last pose of the chunk [s]."""
         return self.after.until
 
     @property
@@ -192,28 +227,21 @@ class Blended(Path):
     @property
     @override
     def knots(self) -> Array:
+        # Without a previous path, the offset chunk is used from the blend's start on.
         before = np.zeros(1) if self.before is None else self.before.knots
-        # Where `before` is over, it is this path from its join on.
-        later = self.after.knots
-        own = [0.0, self.at, self.at + self.window, self.duration]
-        every = np.concatenate([before[before < self.at], later[later > self.at], own])
+        after = self.after.knots
+        ends = [0.0, self.at, self.at + self.window, self.duration]
+        every = np.concatenate([before[before < self.at], after[after > self.at], ends])
         return np.unique(np.clip(every, 0.0, self.duration))
 
     @override
     def evaluate(self, t: Array) -> PathSamples:
-        found = resting(self.after, t)
-        translation, rotation, twist = found.translation, found.rotation, found.twist
-        way, rates = quintic(np.asarray(self.offset), self.window, t - self.at)
-        turned, angular = turning(way[:, 3:], rates[:, 3:])
-        translation = translation + way[:, :3]
-        angular = angular + np.einsum("kij,kj->ki", turned, twist[:, 3:])
-        rotation, twist = turned @ rotation, np.hstack([twist[:, :3] + rates[:, :3], angular])
-        early = t < self.at
-        if self.before is not None and early.any():
-            held = resting(self.before, t[early])
-            translation[early], rotation[early] = held.translation, held.rotation
-            twist[early] = held.twist
-        return PathSamples(t, translation, rotation, twist)
+        offset, rate = _decaying_offset(np.asarray(self.offset), self.window, t - self.at)
+        samples = _displaced(resting(self.after, t), offset, rate)
+        is_before = t < self.at
+        if self.before is None or not is_before.any():
+            return samples
+        return _replaced(samples, is_before, resting(self.before, t[is_before]))
 
     @classmethod
     @override
@@ -223,64 +251,71 @@ class Blended(Path):
         return cls(**{**values, **parts, "before": before and restore(Path, before)})
 
 
-def quintic(offset: Array, window: float, tau: Array) -> tuple[Array, Array]:
-    """Return an offset (3, 6), which fades to zero in a time, and its rate, (K, 6) each.
+def _decaying_offset(offset: Array, window: float, tau: Array) -> tuple[Array, Array]:
+    """Return an offset and its rate, (K, 6) each, that decays from `offset` (3, 6) to zero.
 
-    0 after `window`; before τ = 0 that at 0.
+    Over `window` by a quintic; constant before τ = 0.
     """
     u = np.clip(tau / window, 0.0, 1.0)[:, None]
     coefficients = hermite(
         np.full((1, 1), window), *((row[None], 0.0 * row[None]) for row in offset)
     )
-    way, slope = (evaluated(each, u) for each in (coefficients, differentiated(coefficients)))
+    value, slope = (
+        evaluated(polynomial, u) for polynomial in (coefficients, differentiated(coefficients))
+    )
     inside = (tau >= 0.0) & (tau <= window)
-    return way, slope * inside[:, None] / window
+    return value, slope * inside[:, None] / window
 
 
-def joined(last: Path | None, chunk: Chunk, now: float, approach: Approach) -> Path:
-    """Return a chunk joined to the path that is followed, which holds until the chunk begins.
+def blend(previous: Path | None, chunk: Chunk, now: float, approach: Approach) -> Path:
+    """Return a chunk blended with the path that is followed until it begins.
 
-    In the least time, from a table, in which the offset keeps the limits of the approach. A chunk
-    that was to be joined later and is not yet gives way to this one.
+    The blend takes the shortest time of a geometric sequence in which its rates are within the
+    limits of `approach`. A pending blend that has not begun is replaced.
     """
     at = max(now, chunk.begins)
-    if isinstance(last, Blended) and last.before is not None:
-        last = last.before if last.at > now else replace(last, before=None)
-    if last is None:
+    if isinstance(previous, Blended) and previous.before is not None:
+        previous = previous.before if previous.at > now else replace(previous, before=None)
+    if previous is None:
         return chunk
     # The rates' derivative by a central difference.
-    near = at + DIFFERENCE * np.array([-1.0, 0.0, 1.0])
-    ways, rates = _difference(resting(last, near), resting(chunk, near))
+    t = at + DIFFERENCE * np.array([-1.0, 0.0, 1.0])
+    offsets, rates = _offset_between(resting(previous, t), resting(chunk, t))
     second = (rates[2] - rates[0]) / (2.0 * DIFFERENCE)
-    offset = np.stack([ways[1], rates[1], second])
+    offset = np.stack([offsets[1], rates[1], second])
     window = JOIN_SHORTEST
-    while window < JOIN_LONGEST and not _is_gentle(offset, window, approach):
+    while window < JOIN_LONGEST and not _is_within_limits(offset, window, approach):
         window *= JOIN_FACTOR
-    return Blended(chunk, at, window, offset, last if at > now else None)
+    return Blended(chunk, at, window, offset, previous if at > now else None)
 
 
-def _difference(one: PathSamples, other: PathSamples) -> tuple[Array, Array]:
-    """Return the offset of one path from another and its rate, (K, 6) each: as in `Blended`."""
-    linear = one.translation - other.translation, one.twist[:, :3] - other.twist[:, :3]
-    turns = [a @ b.T for a, b in zip(one.rotation, other.rotation, strict=True)]
-    vectors = np.array([log3(turn) for turn in turns])
-    rates = np.array(
+def _offset_between(path: PathSamples, reference: PathSamples) -> tuple[Array, Array]:
+    """Return the offset of a path from a reference and its rate, (K, 6) each: as in `Blended`."""
+    translation_offset = path.translation - reference.translation
+    translation_rate = path.twist[:, :3] - reference.twist[:, :3]
+    rotation_vectors = np.array(
+        [log3(a @ b.T) for a, b in zip(path.rotation, reference.rotation, strict=True)]
+    )
+    vector_rates = np.array(
         [
-            np.linalg.solve(left_jacobian(phi), a[3:] - exp3(phi) @ b[3:])
-            for phi, a, b in zip(vectors, one.twist, other.twist, strict=True)
+            np.linalg.solve(left_jacobian(phi), twist[3:] - exp3(phi) @ reference_twist[3:])
+            for phi, twist, reference_twist in zip(
+                rotation_vectors, path.twist, reference.twist, strict=True
+            )
         ]
     )
-    return np.hstack([linear[0], vectors]), np.hstack([linear[1], rates])
+    offset = np.hstack([translation_offset, rotation_vectors])
+    return offset, np.hstack([translation_rate, vector_rates])
 
 
-def _is_gentle(offset: Array, window: float, approach: Approach) -> bool:
-    """Return whether an offset fades within the limits of the approach."""
-    _, rates = quintic(offset, window, window * _SHARES)
-    changes = np.diff(rates, axis=0) / (window * _SHARES[1])
+def _is_within_limits(offset: Array, window: float, approach: Approach) -> bool:
+    """Return whether an offset decays within the limits of the approach."""
+    _, rates = _decaying_offset(offset, window, window * _SHARES)
+    accelerations = np.diff(rates, axis=0) / (window * _SHARES[1])
     limits = (
         (rates[:, :3], approach.speed),
         (rates[:, 3:], approach.turning),
-        (changes[:, :3], approach.acceleration),
-        (changes[:, 3:], approach.turning_acceleration),
+        (accelerations[:, :3], approach.acceleration),
+        (accelerations[:, 3:], approach.turning_acceleration),
     )
-    return all(float(np.linalg.norm(x, axis=1).max()) <= most for x, most in limits)
+    return all(float(np.linalg.norm(x, axis=1).max()) <= limit for x, limit in limits)

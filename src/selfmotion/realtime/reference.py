@@ -11,7 +11,7 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, restore
-from selfmotion.model.follow import Follows, only_tip
+from selfmotion.model.follow import Follows, single_tip
 from selfmotion.model.path import Path, PathSamples, check_duration, path_pose, rotations_about
 from selfmotion.model.task import SE3, Jexp3, exp3
 from selfmotion.realtime import law
@@ -163,9 +163,9 @@ class Reference:
     """
 
     def __init__(self, follows: Follows, approach: Approach, times: Array) -> None:
-        task = only_tip(follows).task
+        task = single_tip(follows).task
         self._task, self._times = task, times
-        self._kinematics = only_tip(follows).chain.kinematics()
+        self._kinematics = single_tip(follows).chain.kinematics()
         self._approach = approach.numbers
         self._offsets = np.zeros((int(np.ceil(times.max() / OFFSET_STEP)) + 2, 12))
         self.table = np.zeros((len(times), law.REFERENCE))

@@ -13,7 +13,7 @@ from selfmotion.basics import (
     as_whole,
     one_blas_thread,
 )
-from selfmotion.model.follow import Follows, only_tip
+from selfmotion.model.follow import Follows, single_tip
 from selfmotion.model.motion import NullMotion, PolynomialNullMotion
 from selfmotion.model.path import Dwell, Path, PathSamples
 from selfmotion.model.robot import RobotModel
@@ -31,7 +31,7 @@ from selfmotion.realtime.checks import (
     measured_state,
     observed_target,
 )
-from selfmotion.realtime.chunks import Chunk, joined
+from selfmotion.realtime.chunks import Chunk, blend
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import (
     Commands,
@@ -138,7 +138,7 @@ class Replanner:
         self._horizon = Horizon(
             follows, costs, planned_limits(limits), null_motion, self.horizon, steps, self._around
         )
-        self._kinematics, self._layout = only_tip(follows).chain.kinematics(), follows.layout
+        self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
         mean = cycles_of_mean(robot, envelope, self.cycle)
         self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling, mean)
@@ -299,7 +299,7 @@ class Replanner:
         Both may be anything: their exceptions must not leave the arm without a command.
         """
         try:
-            return joined(self._path.followed, chunk, t, self._approach)
+            return blend(self._path.followed, chunk, t, self._approach)
         except Exception as error:
             reasons.append(f"the chunk is not joined: {type(error).__name__}: {error}")
             return chunk

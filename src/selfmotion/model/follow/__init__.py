@@ -5,15 +5,15 @@ from selfmotion.model.follow.coordinates import (
     generic_values as generic_values,
 )
 from selfmotion.model.follow.follow import BoundTaskFrame as BoundTaskFrame, Follow as Follow
-from selfmotion.model.follow.follows import (
-    Follows as Follows,
+from selfmotion.model.follow.follows import Follows as Follows
+from selfmotion.model.follow.frame_tables import (
     chain_tables as chain_tables,
-    every_column as every_column,
+    joint_columns as joint_columns,
     kinematics_of as kinematics_of,
     linear_rows as linear_rows,
-    null_basis_at as null_basis_at,
-    only_tip as only_tip,
-    row_names_of as row_names_of,
+    null_basis as null_basis,
+    row_names as row_names,
+    single_tip as single_tip,
 )
 from selfmotion.model.follow.relaxed import (
     band_limits as band_limits,

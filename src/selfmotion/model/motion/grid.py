@@ -12,6 +12,8 @@ from selfmotion.basics import Array, read_only
 
 # Nodes in a finite-difference stencil.
 _STENCIL = 5
+# Relative rounding allowance, so that an exact division into steps is not rounded up.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +27,8 @@ class Sampling:
     weights : (S,)
         Quadrature weights [s]: ∫ G dt ≈ weights · G.
     nodes : (N + 1,)
-        Indices of the samples that are nodes: there each time comes once, and between them the
-        motion is smooth.
+        Indices of the samples that are nodes. Node times are distinct; the motion is smooth
+        between them.
     """
 
     t: Array
@@ -121,8 +123,8 @@ class Grid:
 
     @classmethod
     def aligned(cls, knots: Array, steps: int) -> "Grid":
-        """Return about `steps` steps, none across a knot, as equal as the knots allow."""
-        longest = (knots[-1] - knots[0]) / steps * (1.0 + 1e-9)
+        """Return a grid of about `steps` steps of nearly equal length, with a node at each knot."""
+        longest = (knots[-1] - knots[0]) / steps * (1.0 + _ROUNDING)
         parts = [
             np.linspace(left, right, int(np.ceil((right - left) / longest)), endpoint=False)
             for left, right in pairwise(knots)
@@ -130,7 +132,7 @@ class Grid:
         return cls(read_only(np.append(np.concatenate(parts), knots[-1])))
 
     def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
-        """Return the grid with every step cut in two, or those `where` (N,) says so."""
+        """Return the grid with all steps halved, or those of the mask `where` (N,)."""
         middles = 0.5 * self.nodes[:-1] + 0.5 * self.nodes[1:]
         cut = middles if where is None else middles[where]
         return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))

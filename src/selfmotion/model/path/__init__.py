@@ -19,6 +19,7 @@ from selfmotion.model.path.joined import (
     Joined as Joined,
     with_leads as with_leads,
 )
+from selfmotion.model.path.length import path_length as path_length
 from selfmotion.model.path.pace import Pace as Pace, times_when as times_when
 from selfmotion.model.path.polyline import Polyline as Polyline
 from selfmotion.model.path.rates import (

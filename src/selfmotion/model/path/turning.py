@@ -8,7 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
 )
-from selfmotion.model.task import turn, turning
+from selfmotion.model.task import exponentials, products
 
 
 class Turning:
@@ -47,5 +47,5 @@ class Turning:
         vectors = ((cubic * s + square) * s + slope) * s + none
         rates = (3.0 * cubic * s + 2.0 * square) * s + slope
         first = self._first[k]
-        turned, angular = turning(vectors, rates)
-        return first @ turned, turn(first, angular)
+        rotations, angular = exponentials(vectors, rates)
+        return first @ rotations, products(first, angular)

@@ -21,9 +21,9 @@ from selfmotion.model.task.relaxation import (
     Relaxation as Relaxation,
 )
 from selfmotion.model.task.rotation_vectors import (
+    exponentials as exponentials,
+    products as products,
     rotation_vectors as rotation_vectors,
     skews as skews,
-    turn as turn,
-    turning as turning,
 )
 from selfmotion.model.task.rows import Task as Task

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.model.robot import null_space
 from selfmotion.paper.baselines.base import Motion, PoseFeedback, along_rate
-from selfmotion.paper.baselines.local import MANIPULABILITY, pose_gradient
+from selfmotion.paper.baselines.local import MANIPULABILITY, configuration_gradient
 from selfmotion.problem.costs import Cost
 from selfmotion.problem.problem import Problem
 
@@ -53,7 +53,7 @@ class ExtendedJacobian:
             nonlocal counted
             counted += 1
             here = feedback(t, q)
-            slope = pose_gradient(problem, self.criterion, t, q)
+            slope = configuration_gradient(problem, self.criterion, t, q)
             y = np.linalg.solve(here.gram, here.jacobian @ slope)
             return np.asarray(slope - here.jacobian.T @ y)
 

@@ -16,12 +16,12 @@ from selfmotion.model.follow import (
     completed,
     completed_along,
     has_windows,
-    null_basis_at,
+    null_basis,
     windows_shut,
     with_tolerances,
 )
 from selfmotion.model.motion import Sampling, Trajectory
-from selfmotion.model.path import Path
+from selfmotion.model.path import Path, path_length
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.formulation.sampled import SampledMotion
 from selfmotion.planning.formulation.tolerances import band_conditions, of_arm, widest_band
@@ -42,8 +42,7 @@ from selfmotion.problem.problem import (
     Problem,
     envelope_of_problem,
     envelope_without_arm,
-    given_end,
-    length_of,
+    prescribed_end,
     smooth_knots,
 )
 
@@ -151,7 +150,7 @@ class Formulation:
         ends = list(bound.ends)
         bands = band_conditions(self.follows, problem.relaxations)
         pinned = any(item.ends.pins[1] for item in problem.constraints)
-        if pinned and given_end(self.robot, problem.constraints) is None:
+        if pinned and prescribed_end(self.robot, problem.constraints) is None:
             ends.append(_on_path_at_end(self.follows))
         # Those that are there with `apart` alone come last, so that others keep their places.
         limits, points = (*own.limits, *bands.limits), (*bands.points, *own.points)
@@ -195,7 +194,7 @@ class Formulation:
     @cached_property
     def length_in_reaches(self) -> float:
         """Path length of the tool, as a multiple of the arm's reach."""
-        return length_of(self.path) / self.robot.reach
+        return path_length(self.path) / self.robot.reach
 
 
 def has_no_overlap(problem: Problem) -> bool:
@@ -341,7 +340,7 @@ def _end(formulation: Formulation, item: EndCondition, start: Array, end: Array)
         at = target = completed(formulation.follows, np.array([time]), target[None])[0]
     elif target is not None:
         target = np.append(target, np.zeros(formulation.follows.dof - len(target)))
-    return BoundEnd.of(item, target, null_basis_at(formulation.follows, at))
+    return BoundEnd.of(item, target, null_basis(formulation.follows, at))
 
 
 def _with_virtual(formulation: Formulation, own: Envelope) -> Envelope:

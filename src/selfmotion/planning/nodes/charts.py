@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model import kernels
-from selfmotion.model.follow import Follows, chain_tables, every_column, null_basis_at
+from selfmotion.model.follow import Follows, chain_tables, joint_columns, null_basis
 from selfmotion.model.robot import null_space
 from selfmotion.planning.nodes.kernels import accelerate, retract
 
@@ -200,7 +200,7 @@ class Manifolds:
 
     def accelerate(self, place: Place, a: Array) -> None:
         """Set q̈ of a place for a null acceleration a (N + 1, n)."""
-        every = every_column(self.follows, place.q)
+        every = joint_columns(self.follows, place.q)
         given = self.path_accelerations, np.ascontiguousarray(a)
         accelerate(place.table, self.layout, every, *given, place.qdd)
 
@@ -253,7 +253,7 @@ class Manifolds:
             return Charts(self, q, self._bases(q)).centred(none, epsilon, a)
         bases = np.zeros((len(q), n, n - m))
         for first in range(0, len(q), len(q) // self.copies):
-            bases[first] = null_basis_at(self.follows, q[first])
+            bases[first] = null_basis(self.follows, q[first])
         return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, called, inlined, kernel, meanwhile
 from selfmotion.basics.layout import Layout, layout_of
-from selfmotion.model.follow import every_column
+from selfmotion.model.follow import joint_columns
 from selfmotion.model.kernels import (
     Every,
     Stage,
@@ -78,9 +78,9 @@ class LocalModel:
         (count, n, r), layout, follows = charts.bases.shape, own.layout, own.follows
         directions = _directions(r)
         q = np.empty((2 * len(directions), count, n))
-        bases, here = np.ascontiguousarray(charts.bases), every_column(follows, place.q)
+        bases, here = np.ascontiguousarray(charts.bases), joint_columns(follows, place.q)
         neighbours(table, layout, here, bases, directions, _REACH, q)
-        there = every_column(follows, q.reshape(-1, n)) if here is not None else None
+        there = joint_columns(follows, q.reshape(-1, n)) if here is not None else None
         changes, curvature = np.zeros((count, 3, n, 3 * r)), np.zeros((count, 3 * r, 3 * r))
         failed = differences(
             q,

@@ -10,7 +10,6 @@ from selfmotion.planning.paper.objective import (
     parts_of as parts_of,
 )
 from selfmotion.planning.paper.solution import (
-    Method as Method,
-    Solution as Solution,
-    solve as solve,
+    MethodInputs as MethodInputs,
+    PublishedMotion as PublishedMotion,
 )

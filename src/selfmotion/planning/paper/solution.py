@@ -1,9 +1,12 @@
-"""The published method from one start, on grids as fine as the cost needs."""
+"""Published method on successive grids: optimisation on one grid, then on halved ones.
 
-from collections.abc import Callable, Sequence
+It ends where the cost has converged.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 
@@ -32,37 +35,91 @@ from selfmotion.planning.paper.objective import Objective, parts_of, require_fin
 from selfmotion.planning.rollout import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.problem.constraints import BoundConstraint
 
-# Relative agreement of the cost on a grid and on the halved one.
+# Relative change of the cost between two grids at which it has converged.
 _AGREEMENT = 1e-4
-# Factor of a rise of the cost from grid to grid.
-_RISE = 1.5
-# Such grids in turn that show a cost without limit: the path leaves the workspace between nodes.
-_RISES = 2
-# Changes of the unknowns' basis far from the reference …
-_CHARTS = 200
-# … while the cost falls by this share with each.
-_FALL = 1e-6
-# Statuses that a change of basis may mend …
-_STUCK = (Status.PRECISION, Status.GRADIENT)
-# … and those after which nothing goes on.
-_OVER = (Status.UNBOUNDED, Status.GRADIENT, Status.INFEASIBLE, Status.MAX_EVALUATIONS)
+# Ratio of the costs on successive grids that indicates divergence.
+_COST_GROWTH = 1.5
+# Such ratios in succession after which refinement ends: the path leaves the workspace between
+# nodes.
+_MAX_GROWTHS = 2
+# Largest number of bases of the unknowns on one grid.
+_MAX_BASES = 200
+# Relative decrease of the cost that justifies another basis.
+_MIN_DECREASE = 1e-6
+# Statuses after which another basis is tried.
+_MAY_NEED_NEW_BASIS = (Status.PRECISION, Status.GRADIENT)
+# Statuses after which the grid is not refined.
+_FINAL_STATUSES = (
+    Status.UNBOUNDED,
+    Status.GRADIENT,
+    Status.INFEASIBLE,
+    Status.MAX_EVALUATIONS,
+)
+
+
+class _Recorder:
+    """Callback of an optimiser: records iterates as decision vectors, stops it for a new basis.
+
+    Parameters
+    ----------
+    to_decision : callable
+        Returns the decision vector of an iterate, and whether another basis is better from there.
+    callback : callable or None
+        The user's; called with each `Iteration` of decision vectors.
+    skips_first : bool
+        Whether the first iterate is recorded already, as the last one in another basis.
+
+    Attributes
+    ----------
+    iterates : list of Iteration
+    needs_new_basis : bool
+    """
+
+    def __init__(
+        self,
+        to_decision: Callable[[Array], tuple[Array, bool]],
+        callback: Callback | None,
+        skips_first: bool,
+    ) -> None:
+        self._to_decision, self._callback = to_decision, callback
+        self._skips_next = skips_first
+        self.iterates: list[Iteration] = []
+        self.needs_new_basis = False
+
+    def __call__(self, iteration: Iteration) -> bool:
+        """Record an iterate; return whether the optimiser has to stop."""
+        if self._skips_next:
+            self._skips_next = False
+            return False
+        point, is_far = self._to_decision(iteration.x)
+        self.iterates.append(replace(iteration, x=read_only(point)))
+        stops = self._callback is not None and bool(self._callback(self.iterates[-1]))
+        self.needs_new_basis = is_far and not stops
+        return is_far or stops
 
 
 @dataclass(frozen=True, eq=False)
-class Method:
-    """Common data of all solutions from one start; see `solve`.
+class MethodInputs:
+    """Inputs of the published method that are the same on all grids.
 
     Attributes
     ----------
     formulation : Formulation
+        Its null motion and costs are used; of its constraints, only `ends`.
     minimum_norm : MinimumNormMotion
+        The motion at x = 0.
     free : bool
+        Whether the start may move along its self-motion.
     ends : tuple of BoundConstraint
+        Equality constraints on the ends of the motion, bound to that at x = 0; they are eliminated.
     optimizer : Optimizer
+        Minimises the cost.
     counts : Counts
+        Counter of evaluations.
     limit : int or None
-        Of `Counts.evaluations`.
+        Largest value of `counts.evaluations`; None for no limit.
     callback : callable or None
+        Called with each `Iteration` of decision vectors; returning True stops.
     """
 
     formulation: Formulation
@@ -90,54 +147,44 @@ class Method:
         function: Function,
         x: Array,
         inverse_hessian: Array | None,
-        where: Callable[[Array], tuple[Array, bool]] = lambda x: (x, False),
-        known: bool = False,
+        to_decision: Callable[[Array], tuple[Array, bool]] = lambda x: (x, False),
+        skips_first: bool = False,
     ) -> tuple[Minimum, list[Iteration], bool]:
-        """Return a function's minimum, the decision vectors on the way, and whether to go on.
+        """Return a function's minimum, the iterates, and whether a new basis is needed.
 
-        `where` returns these, and whether another basis is better from there; `known` is whether
-        the callback has had the start.
+        Iterates are decision vectors; see `_Recorder`. For a new basis the optimiser was stopped.
         """
-        iterates: list[Iteration] = []
-        goes_on = False
-
-        def note(iteration: Iteration) -> bool:
-            nonlocal goes_on
-            point, is_far = where(iteration.x)
-            iterates.append(replace(iteration, x=read_only(point)))
-            if known and len(iterates) == 1:
-                return False
-            stops = self.callback is not None and bool(self.callback(iterates[-1]))
-            goes_on = is_far and not stops
-            return is_far or stops
-
-        # Of no unknowns any point is the minimum.
+        recorder = _Recorder(to_decision, self.callback, skips_first)
+        # Without unknowns any optimiser will do; a user's may not accept an empty vector.
         optimizer = self.optimizer if len(x) else QuasiNewton()
-        found = optimizer.minimize(
-            function, x, inverse_hessian, max_evaluations=self.limit, callback=note
+        minimum = optimizer.minimize(
+            function, x, inverse_hessian, max_evaluations=self.limit, callback=recorder
         )
-        what = f"x = {shown(found.x)}" if isinstance(found, Minimum) else shown(found)
-        if (
-            not isinstance(found, Minimum)
-            or np.shape(found.x) != x.shape
-            or not np.all(np.isfinite(found.x))
-        ):
-            raise ProblemError(
-                f"optimizer: {type(optimizer).__name__} returned {what}, expected a Minimum of "
-                f"{len(x)} finite numbers; selfmotion.testing.check_optimizer checks an optimiser"
-            )
-        return found, iterates[known:], goes_on
+        _require_minimum(minimum, x, optimizer)
+        return minimum, recorder.iterates, recorder.needs_new_basis
+
+
+def _require_minimum(minimum: Any, x: Array, optimizer: Optimizer) -> None:
+    """Raise ProblemError where a user's optimiser returns no finite minimum."""
+    is_minimum = isinstance(minimum, Minimum)
+    if is_minimum and np.shape(minimum.x) == x.shape and np.all(np.isfinite(minimum.x)):
+        return
+    what = f"x = {shown(minimum.x)}" if is_minimum else shown(minimum)
+    raise ProblemError(
+        f"optimizer: {type(optimizer).__name__} returned {what}, expected a Minimum of "
+        f"{len(x)} finite numbers; selfmotion.testing.check_optimizer checks an optimiser"
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
-    """A motion of the published method on one grid; made by `solve`.
+class PublishedMotion:
+    """A motion of the published method on one grid; made by `selfmotion.planning.planner`.
 
     Attributes
     ----------
-    method : Method
+    method : MethodInputs
     objective : Objective
-        On its grid.
+        The cost as a function of x on one grid.
     x : (size,)
         The decision vector [z | coefficients].
     inverse_hessian : (size, size) or None
@@ -145,10 +192,10 @@ class Solution:
     status : Status
         How the last optimisation ended; INFEASIBLE where the ends cannot be met from here.
     history : tuple of Iteration
-        On all grids.
+        Iterations on all grids so far.
     """
 
-    method: Method
+    method: MethodInputs
     objective: Objective
     x: Array
     inverse_hessian: Array | None = None
@@ -162,12 +209,12 @@ class Solution:
 
     @property
     def steps(self) -> int:
-        """Of its grid."""
+        """Number N of steps of the grid."""
         return self.objective.grid.steps
 
     @cached_property
     def cost(self) -> float:
-        """F."""
+        """The cost F(x)."""
         return self.objective.value(self.x)
 
     @cached_property
@@ -191,163 +238,105 @@ class Solution:
         return self.objective.at(np.zeros_like(self.x))
 
     def refined(self, where: Flags | None = None) -> Self:
-        """Return it with half the step length, for all or some of the steps (N,).
+        """Return the motion with all steps halved, or those of the mask (N,).
 
-        With its ends met there, but not optimised anew.
+        The end conditions are met again; the cost is not optimised.
 
         Raises
         ------
         BreakdownError
             The motion breaks down on that grid.
         """
-        return self._on(self.method.on(self.objective.grid.halved(where)))
+        return self._with_objective(self.method.on(self.objective.grid.halved(where)))
 
-    def again(self) -> Self:
-        """Return the optimum on its grid, from here; after an interruption, the best so far."""
+    def optimised(self) -> Self:
+        """Return the optimum on this grid; after a keyboard interrupt, the best motion so far."""
         if self.unmet:
             return replace(self, status=Status.INFEASIBLE)
-        found, size = self, None
+        motion, size = self, None
         try:
-            for _ in range(_CHARTS):
-                before = found
-                found, size = found._optimised(size)
+            for _ in range(_MAX_BASES):
+                previous = motion
+                motion, size = motion._optimised_in_basis(size)
                 # Without a step, other combinations may meet the ends.
-                if size is None or found.status not in _STUCK:
+                if size is None or motion.status not in _MAY_NEED_NEW_BASIS:
                     break
-                if not before.cost - found.cost > _FALL * abs(found.cost):
+                if not previous.cost - motion.cost > _MIN_DECREASE * abs(motion.cost):
                     break
         except KeyboardInterrupt:
-            return replace(found, status=Status.INTERRUPTED)
-        return found
+            return replace(motion, status=Status.INTERRUPTED)
+        return motion
 
-    def settled(self) -> Self:
-        """Return the optimum on its grid, and on halved ones until the cost agrees."""
+    def converged(self) -> Self:
+        """Return the optimum on this grid, then on halved grids until the cost converges."""
         try:
-            return _converged(self._on(self.objective).again())
+            return self._with_objective(self.objective).optimised()._on_finer_grids()
         except KeyboardInterrupt:
             return replace(self, status=Status.INTERRUPTED)
 
-    def _optimised(self, before: int | None) -> tuple[Self, int | None]:
-        """Return the optimum as far as the unknowns lead, and their number; None for x itself.
+    def _on_finer_grids(self) -> Self:
+        """Return the optimum on the first halved grid on which its cost has converged."""
+        motion, growths = self, 0
+        most = self.method.minimum_norm.grid.steps * 2**MOST_HALVINGS
+        try:
+            while motion.steps < most and not motion._is_final:
+                finer = motion.refined()
+                cost, change = motion.cost, _change(motion.cost, finer.cost)
+                growths = growths + 1 if finer.cost > _COST_GROWTH * abs(cost) else 0
+                if growths == _MAX_GROWTHS:
+                    return finer
+                motion = finer.optimised()
+                # The optimum has to agree, too: on a coarse grid it may be no motion.
+                if max(change, _change(cost, motion.cost)) <= _AGREEMENT:
+                    break
+        except BreakdownError:
+            # On a finer grid there is no such motion: the present one is judged.
+            pass
+        except KeyboardInterrupt:
+            motion = replace(motion, status=Status.INTERRUPTED)
+        return motion
 
-        `before` is the number of earlier iterations: the callback has had the start then.
+    @property
+    def _is_final(self) -> bool:
+        """Whether the last optimisation ended so that the grid is not refined."""
+        return self.status.is_cut_short or self.status in _FINAL_STATUSES
+
+    def _optimised_in_basis(self, size_before: int | None) -> tuple[Self, int | None]:
+        """Return the optimum in one basis of the unknowns, and their number.
+
+        None where nothing is eliminated, or the ends cannot be met in this basis. `size_before` is
+        the number of unknowns of the previous basis; None for the first.
         """
         method, objective, inverse = self.method, self.objective, self.inverse_hessian
         size = None
         if objective.ends and len(self.x):
             function = Eliminated(objective, self.x)
             size, y = function.size, np.zeros(function.size)
-            if before not in (None, size):
+            if size_before not in (None, size):
                 # Conditions are dependent here that are not elsewhere.
                 return self, None
             if not function.is_met(y):
                 return replace(self, status=Status.INFEASIBLE), None
             inverse = None if inverse is None else to_unknowns(function, inverse)
-            found, iterates, left = method.minimum(
-                function, y, inverse, function.where, before is not None
+            minimum, iterates, needs_new_basis = method.minimum(
+                function, y, inverse, function.where, skips_first=size_before is not None
             )
-            x = function.point(found.x)
-            inverse = from_unknowns(function, found.x, found.inverse_hessian)
+            x = function.point(minimum.x)
+            inverse = from_unknowns(function, minimum.x, minimum.inverse_hessian)
         else:
-            found, iterates, left = method.minimum(objective, self.x, inverse)
-            x, inverse = np.array(found.x), found.inverse_hessian
-        status = Status.PRECISION if left else found.status
+            minimum, iterates, needs_new_basis = method.minimum(objective, self.x, inverse)
+            x, inverse = np.array(minimum.x), minimum.inverse_hessian
+        status = Status.PRECISION if needs_new_basis else minimum.status
         history = (*self.history, *iterates)
-        better = replace(self, x=x, inverse_hessian=inverse, status=status, history=history)
-        return better, size
+        optimum = replace(self, x=x, inverse_hessian=inverse, status=status, history=history)
+        return optimum, size
 
-    def _on(self, objective: Objective) -> Self:
-        """Return it with another objective of the same unknowns, with its ends met."""
+    def _with_objective(self, objective: Objective) -> Self:
+        """Return the motion with another objective of the same unknowns, and its ends met."""
         if not np.isfinite(objective.value(self.x)):
             require_finite_at(objective, self.x)
         x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
         return replace(self, objective=objective, x=x)
-
-
-_Solution = TypeVar("_Solution", bound=Solution)
-
-
-def solve(
-    formulation: Formulation,
-    minimum_norm: MinimumNormMotion,
-    *,
-    free: bool = False,
-    ends: Sequence[BoundConstraint] = (),
-    optimizer: Optimizer | None = None,
-    counts: Counts | None = None,
-    most: int | None = None,
-    callback: Callback | None = None,
-    x0: Array | None = None,
-) -> Solution:
-    """Return the optimum of the published method around a motion at x = 0.
-
-    On its grid, then on halved ones, until the cost agrees with that on the grid before.
-
-    Parameters
-    ----------
-    formulation : Formulation
-        Its null motion and costs are used; of its constraints, only `ends`.
-    minimum_norm : MinimumNormMotion
-        The motion at x = 0.
-    free : bool
-        Whether the start may move along its self-motion.
-    ends : sequence of BoundConstraint
-        Equalities on the ends of the motion, bound to that at x = 0; they are eliminated.
-    optimizer : Optimizer, optional
-        By default `QuasiNewton`.
-    counts : Counts, optional
-        Where work is added up.
-    most : int, optional
-        Evaluations of F at most.
-    callback : callable, optional
-        Called with each `Iteration`, of decision vectors; returning True stops.
-    x0 : (size,), optional
-        Initial decision vector; by default, and if that is no motion, 0.
-
-    Returns
-    -------
-    Solution
-        After an interruption from the keyboard, the best so far.
-
-    Raises
-    ------
-    BreakdownError
-        The motion at x = 0 breaks down.
-    ProblemError
-        A cost has no finite value on the initial motion, a condition on the ends is no equality, or
-        a user's optimiser returns no decision vector.
-    """
-    counts = Counts() if counts is None else counts
-    limit = None if most is None else counts.evaluations + most
-    own = QuasiNewton() if optimizer is None else optimizer
-    method = Method(formulation, minimum_norm, free, tuple(ends), own, counts, limit, callback)
-    objective = method.on(minimum_norm.grid)
-    x = np.zeros(objective.size)
-    if x0 is not None and np.isfinite(objective.value(x0)):
-        x = np.array(x0, dtype=np.float64)
-    return Solution(method, objective, x).settled()
-
-
-def _converged(found: _Solution) -> _Solution:
-    """Return the optimum on halved grids, once its cost agrees with that on the one before."""
-    rises, most = 0, found.method.minimum_norm.grid.steps * 2**MOST_HALVINGS
-    try:
-        while found.steps < most and not (found.status.is_cut_short or found.status in _OVER):
-            finer = found.refined()
-            before, changed = found.cost, _change(found.cost, finer.cost)
-            rises = rises + 1 if finer.cost > _RISE * abs(before) else 0
-            if rises == _RISES:
-                return finer
-            found = finer.again()
-            # The optimum has to agree, too: on a coarse grid it may be no motion.
-            if max(changed, _change(before, found.cost)) <= _AGREEMENT:
-                break
-    except BreakdownError:
-        # On a finer grid there is no such motion: the present one is judged.
-        pass
-    except KeyboardInterrupt:
-        found = replace(found, status=Status.INTERRUPTED)
-    return found
 
 
 def _change(before: float, after: float) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, RedundancyError
-from selfmotion.model.follow import completed, null_basis_at
+from selfmotion.model.follow import completed, null_basis
 from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
 from selfmotion.planning.formulation import Formulation, keeps_off_itself, with_windows_shut
@@ -294,7 +294,7 @@ class _Push:
 
 def _pushes(formulation: Formulation, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may stay in a plane without a continuation."""
-    basis = null_basis_at(formulation.follows, start) / formulation.path.duration
+    basis = null_basis(formulation.follows, start) / formulation.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 

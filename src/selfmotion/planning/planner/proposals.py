@@ -146,7 +146,7 @@ def _pushed(planner: Planner, starts: abc.Sequence[Array], t: Array, at: int) ->
     # Motions at their limits break them between nodes.
     poses = inside(SinglePoses(planner.formulation, np.random.default_rng(0)))
     q = np.array(starts)
-    if poses.bounds.keep(q).any():
+    if poses.bounds.is_admissible(q).any():
         return []
     best, follows = planner.incumbent, planner.formulation.follows
     if best is not None:

@@ -15,7 +15,6 @@ from selfmotion.model.motion import (
     Trajectory,
 )
 from selfmotion.model.robot import null_space
-from selfmotion.planning import paper
 from selfmotion.planning.formulation import (
     BoundConditions,
     Formulation,
@@ -23,7 +22,7 @@ from selfmotion.planning.formulation import (
     sampled,
 )
 from selfmotion.planning.optimise import Optimizer, Status
-from selfmotion.planning.paper import Method, Objective, parts_of
+from selfmotion.planning.paper import MethodInputs, Objective, PublishedMotion, parts_of
 from selfmotion.planning.planner.guess import Guess, pace_of
 from selfmotion.planning.planner.outcomes import OutcomeFacts
 from selfmotion.planning.planner.solution import Solution
@@ -32,7 +31,7 @@ from selfmotion.problem.costs import Samples
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedOutcome(paper.Solution):
+class PublishedOutcome(PublishedMotion):
     """A motion of the published method, optimised.
 
     Attributes
@@ -82,10 +81,10 @@ def solve_as_published(solution: Solution, optimizer: Optimizer) -> Solution:
     """Return the optimum of the published method, on its grids, or on that of the solution."""
     before = solution.outcome
     if isinstance(before, PublishedOutcome):
-        found = before.again()
+        found = before.optimised()
     else:
         begun = _first(solution.guess, optimizer)
-        found = replace(begun, x=_first_coefficients(begun, solution.guess)).settled()
+        found = replace(begun, x=_first_coefficients(begun, solution.guess)).converged()
     ended = Status.INTERRUPTED if found.status is Status.INTERRUPTED else solution.ended
     return replace(solution, outcome=found, history=tuple(found.history), ended=ended)
 
@@ -98,7 +97,7 @@ def _first(guess: Guess, optimizer: Optimizer) -> PublishedOutcome:
         formulation = Formulation.of(polynomial)
     ends, most = guess.conditions.ends, effort.max_evaluations
     limit = None if most is None else effort.counts.evaluations + most
-    method = Method(
+    method = MethodInputs(
         formulation, begun, guess.free, ends, optimizer, effort.counts, limit, effort.callback
     )
     objective = Objective.of(

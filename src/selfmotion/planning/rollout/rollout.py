@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model import kernels
-from selfmotion.model.follow import Follows, every_column, kinematics_of
+from selfmotion.model.follow import Follows, joint_columns, kinematics_of
 from selfmotion.model.motion import Grid
 from selfmotion.model.path import PathSamples
 from selfmotion.model.task import DampingLaw, feedback_rate
@@ -37,7 +37,7 @@ class Rollout:
         self.follows, self.robot, self.grid = follows, follows.robot, grid
         self.damping = damping
         self.jacobian_evaluations = 0
-        self._kinematics = kinematics_of(follows).each
+        self._kinematics = kinematics_of(follows).tips
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(follows.duration)
         self._table, self._at, self._tips = _new_table(self, len(grid.stage_times))
@@ -244,7 +244,7 @@ def _last_run(
     rollout: Rollout,
 ) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
     """Arguments of the last run for kernels that differentiate it."""
-    columns = every_column(rollout.follows, rollout._at.q)
+    columns = joint_columns(rollout.follows, rollout._at.q)
     return (
         rollout._table,
         rollout.follows.layout,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.model.follow import Follows, kinematics_of, null_basis_at
+from selfmotion.model.follow import Follows, kinematics_of, null_basis
 from selfmotion.model.task import SE3
 
 # Newton steps onto the start of the path; far starts fail with an error.
@@ -44,7 +44,7 @@ class FreeStart:
 
     def __init__(self, follows: Follows, reference: Array) -> None:
         self._follows, self._reference = follows, reference
-        self._null = null_basis_at(follows, reference)
+        self._null = null_basis(follows, reference)
         self._at = reference
         self._tips = kinematics_of(follows)
 

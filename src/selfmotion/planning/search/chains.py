@@ -10,8 +10,9 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.model.collision import Closest, CollisionModel
 from selfmotion.planning.search.curves import CurveSet, SelfMotion
-from selfmotion.planning.search.measures import Length, Measure
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.layer_steps import unturned
+from selfmotion.planning.search.measures import JointTravel, Measure
+from selfmotion.planning.search.search_bounds import SearchBounds
 
 # Intervals of the spline that smooths a chain, per interval of the chain.
 _SMOOTHING = 3
@@ -115,12 +116,12 @@ def best_chains(
     measure : Measure, optional
         By default the length, all joints alike.
     """
-    measure = Length(np.ones(len(turning))) if measure is None else measure
+    measure = JointTravel(np.ones(len(turning))) if measure is None else measure
     cost = [np.zeros(len(layers[0]))]
     parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
     steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
     for k, (before, after) in enumerate(itertools.pairwise(layers)):
-        reach, source = measure.extended(k, before, cost[-1], after, steps[k], turning)
+        reach, source = measure.relaxed_layer(k, before, cost[-1], after, steps[k], turning)
         cost.append(reach)
         parent.append(source)
     return Chains(tuple(cost), tuple(parent))
@@ -141,7 +142,7 @@ def diverse_chains(
     too few others.
     """
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
-    back = None if measure is None else measure.backwards()
+    back = None if measure is None else measure.reversed()
     reverse = best_chains(layers[::-1], backwards, turning, back)
     stations = stations_of(len(layers))
     through = [
@@ -181,8 +182,8 @@ def ranked(
     times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
 ) -> list[Sequence]:
     """Return the sequences, the best first, without those that became like a better one."""
-    length = Length(weights)
-    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
+    length = JointTravel(weights)
+    sequences = [Sequence(times, q, length.cost_of(q), measure.cost_of(q)) for q in motions]
     selected: list[Sequence] = []
     for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
         if all(unlike(sequence.q, other.q, turning) for other in selected):
@@ -219,19 +220,13 @@ def _distance(q: Array, other: Array, turning: Flags) -> Array:
     return np.asarray(np.abs(unturned(q - other, turning)).max(axis=-1))
 
 
-def unturned(difference: Array, turning: Flags) -> Array:
-    """Return differences (…, n) modulo turns in the joints that turn without end."""
-    turn = 2.0 * np.pi
-    return np.where(turning, difference - turn * np.round(difference / turn), difference)
-
-
 def why_blocked(
     motion: SelfMotion,
     target: Array,
     curves: CurveSet,
     alive: Array,
     vertices: Array,
-    bounds: Admissible,
+    bounds: SearchBounds,
     largest_step: Array,
 ) -> str:
     """Return why no chain reaches a waypoint.
@@ -247,7 +242,7 @@ def why_blocked(
         Vertices of the waypoint before that chains reach; empty at the first waypoint.
     vertices : (N, n)
         Vertices at the waypoint.
-    bounds : Admissible
+    bounds : SearchBounds
     largest_step : (n,)
     """
     if not curves.curves:
@@ -257,7 +252,7 @@ def why_blocked(
         return f"of all configurations there, {_refusals(samples, bounds, motion)}"
     continued, arrived = motion.project_all(alive, target)
     ending = continued[arrived]
-    ending = ending[~bounds.free(ending)]
+    ending = ending[~bounds.is_admissible_modulo_turns(ending)]
     step = _step(alive, vertices, bounds, largest_step, motion)
     if not len(ending):
         return step
@@ -268,7 +263,7 @@ def why_blocked(
     )
 
 
-def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
+def _refusals(samples: Array, bounds: SearchBounds, motion: SelfMotion) -> str:
     """Return in words what excludes configurations: the joint or pair nearest to being allowed."""
     excess = bounds.excess(samples)
     outside = excess.max(axis=1) > 0.0
@@ -302,10 +297,10 @@ def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
 
 
 def _step(
-    alive: Array, vertices: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
+    alive: Array, vertices: Array, bounds: SearchBounds, largest_step: Array, motion: SelfMotion
 ) -> str:
     """Name the joint whose step limit keeps the nearest vertex away."""
-    steps = np.abs(unturned(vertices[None] - alive[:, None], bounds.turning))
+    steps = np.abs(unturned(vertices[None] - alive[:, None], bounds.is_unbounded))
     ratios = (steps / largest_step).max(axis=-1)
     a, b = np.unravel_index(int(np.argmin(ratios)), ratios.shape)
     k = int(np.argmax(steps[a, b] / largest_step))

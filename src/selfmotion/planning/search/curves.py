@@ -11,6 +11,7 @@ from selfmotion.basics.layout import Layout
 from selfmotion.model.follow import Follows, kinematics_of
 from selfmotion.model.kernels import rows_of
 from selfmotion.model.robot import place_tips
+from selfmotion.planning.search.layer_steps import wrapped
 from selfmotion.planning.search.manifold import (
     CONVERGED,
     LONGEST_CORRECTION,
@@ -18,7 +19,6 @@ from selfmotion.planning.search.manifold import (
     correct,
     correction_space,
 )
-from selfmotion.planning.search.measures import wrapped
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
 SPACING = 0.1

@@ -12,11 +12,11 @@ from selfmotion.model.task import log3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.chains import Sequence
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, measure_of
+from selfmotion.planning.search.measures import JointTravel, measure_of
 from selfmotion.planning.search.sampled import sampled_layers
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.sequences import Layers, best_sequences, curve_layers
 from selfmotion.planning.search.shortest import Shortest
-from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.costs import PathLength
 
 # Number of refined sequences: the best among the samples is not always that of the best motion.
@@ -111,10 +111,10 @@ def shortest_along(
         if not arrived.all():
             return None
     bodies = tuple((model, distance + _MARGIN) for model, distance in allowed.bodies)
-    bounds = Admissible(*limits, formulation.coordinates.is_revolute, bodies)
+    bounds = SearchBounds(*limits, formulation.coordinates.is_revolute, bodies)
     largest = np.minimum(_CHAIN_SPEED * allowed.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
-    return (where, here) if bounds.keep(here).all() else None
+    return (where, here) if bounds.is_admissible(here).all() else None
 
 
 def _between(t: Array, q: Array, where: Array) -> Array:
@@ -125,7 +125,7 @@ def _between(t: Array, q: Array, where: Array) -> Array:
 def asks_length(formulation: Formulation) -> bool:
     """Whether sequences are chosen by their length."""
     t, weights = np.array([0.0, formulation.path.duration]), _weights(formulation)
-    return isinstance(measure_of(formulation, t, weights), Length)
+    return isinstance(measure_of(formulation, t, weights), JointTravel)
 
 
 def has_curves(formulation: Formulation) -> bool:

@@ -1,117 +1,30 @@
-"""Measures of chains of configurations: their length, or the problem's costs."""
+"""Additive costs of chains of configurations: joint travel, or the running cost of a problem."""
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, kernel
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.search.layer_cache import LayerCache
+from selfmotion.planning.search.layer_steps import cheapest, near_pairs, relax_steps, unturned
 from selfmotion.problem.costs import Cost, PathLength, Samples
 
-# Steps faster than this many times the mean speed of the shortest chain are sampling noise, which
-# the finished motion spreads over more time.
-_FAST = 2.0
-# Layers with cached kinematics, per waypoint; they bound memory alone.
-_LAYERS_KEPT = 3
-
-
-@kernel
-def wrapped(difference: float, revolute: bool) -> float:
-    """Return the difference of two coordinates, modulo a turn where the joint is revolute."""
-    if revolute:
-        turns = np.floor(difference / (2.0 * np.pi) + 0.5)
-        return float(difference - 2.0 * np.pi * turns)
-    return difference
-
-
-@kernel
-def extend(
-    before: Array,
-    cost: Array,
-    after: Array,
-    largest_step: Array,
-    turning: Flags,
-    weights: Array,
-    reach: Array,
-    parent: Ints,
-) -> None:
-    """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
-
-    The cost of a step is Σ w|Δq| with `weights` (n,); `turning` joints count modulo turns. `before`
-    is sorted by its first joint unless that one turns. `parent` is -1 where no step is short
-    enough.
-    """
-    n, many = after.shape[1], before.shape[0]
-    for j in range(after.shape[0]):
-        reach[j], parent[j] = np.inf, -1
-        first = 0
-        if not turning[0]:
-            first = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
-        for i in range(first, many):
-            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
-                break
-            total = cost[i]
-            for k in range(n):
-                step = abs(wrapped(after[j, k] - before[i, k], turning[k]))
-                total += weights[k] * step
-                if step > largest_step[k] or total >= reach[j]:
-                    total = np.inf
-                    break
-            if total < reach[j]:
-                reach[j], parent[j] = total, i
-
-
-@kernel
-def near_pairs(
-    before: Array, after: Array, largest_step: Array, turning: Flags
-) -> tuple[Ints, Ints]:
-    """Return the pairs of vertices (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
-
-    No joint may move by more than `largest_step`; otherwise as `extend`.
-    """
-    n, many = after.shape[1], before.shape[0]
-    room = 4 * (many + after.shape[0])
-    first, second = np.empty(room, dtype=np.intp), np.empty(room, dtype=np.intp)
-    count = 0
-    for j in range(after.shape[0]):
-        begin = 0
-        if not turning[0]:
-            begin = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
-        for i in range(begin, many):
-            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
-                break
-            near = True
-            for k in range(n):
-                if abs(wrapped(after[j, k] - before[i, k], turning[k])) > largest_step[k]:
-                    near = False
-                    break
-            if near:
-                if count == room:
-                    room *= 2
-                    longer = np.empty((2, room), dtype=np.intp)
-                    longer[0, :count], longer[1, :count] = first, second
-                    first, second = longer[0], longer[1]
-                first[count], second[count] = i, j
-                count += 1
-    return first[:count].copy(), second[:count].copy()
-
-
-@kernel
-def lower_to_cheapest(
-    first: Ints, second: Ints, price: Array, cost: Array, reach: Array, parent: Ints
-) -> None:
-    """Lower `reach` (M,) to the least cost over steps with prices (P,), and set `parent`."""
-    for k in range(len(first)):
-        total = cost[first[k]] + price[k]
-        if total < reach[second[k]]:
-            reach[second[k]], parent[second[k]] = total, first[k]
+# Ratio of a step's speed to the mean speed of the shortest chain above which the step counts as if
+# it took longer: such speeds are an artefact of sampling.
+_MAX_SPEED_RATIO = 2.0
+# Layers per waypoint in a cache; bounds memory only.
+_CACHED_LAYERS = 3
+# Samples of a random motion that shows on which derivatives costs depend: several, as costs may
+# take differences over them.
+_PROBE_SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Length:
-    """Σ w|Δq|.
+class JointTravel:
+    """Weighted joint travel Σ w|Δq| of a chain.
 
     Attributes
     ----------
@@ -121,10 +34,18 @@ class Length:
 
     weights: Array
 
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    def relaxed_layer(
+        self,
+        k: int,
+        before: Array,
+        cost: Array,
+        after: Array,
+        largest_step: Array,
+        is_unbounded: Flags,
     ) -> tuple[Array, Ints]:
         """Return the least costs at the vertices of waypoint k + 1, and their predecessors.
+
+        One step of Bellman's recursion.
 
         Parameters
         ----------
@@ -133,49 +54,65 @@ class Length:
         before, cost : (N, n), (N,)
             Its vertices, sorted by the first joint, and the costs of chains to them.
         after : (M, n)
-        step : (n,)
-            No joint may move more.
-        turning : (n,)
-            Joints that count modulo turns.
+            Vertices of waypoint k + 1.
+        largest_step : (n,)
+            Largest change of each joint [rad or m].
+        is_unbounded : (n,)
+            Joints that are compared modulo 2π.
 
         Returns
         -------
         (M,), (M,)
             inf and -1 where no step is short enough.
         """
-        reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
-        longest = np.ascontiguousarray(step)
-        extend(before, cost, after, longest, turning, self.weights, reach, source)
-        return reach, source
+        least_cost, parent = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
+        step = np.ascontiguousarray(largest_step)
+        relax_steps(before, cost, after, step, is_unbounded, self.weights, least_cost, parent)
+        return least_cost, parent
 
-    def of(self, q: Array) -> float:
+    def cost_of(self, q: Array) -> float:
         """Return the cost of a motion (W, n)."""
         return float((np.abs(np.diff(q, axis=0)) * self.weights).sum())
 
-    def backwards(self) -> Self:
-        """Return that of the same path from its end to its start."""
+    def reversed(self) -> Self:
+        """Return the measure of chains from the last waypoint to the first."""
         return self
+
+
+class _LayerCost(NamedTuple):
+    """Samples of a layer (N, n) at rest, and the costs of these configurations, (N,)."""
+
+    samples: Samples
+    cost: Array
+
+
+class _StepCosts(NamedTuple):
+    """Pairs of near vertices of two layers (P,), (P,), and the costs of these steps, (P,)."""
+
+    first: Ints
+    second: Ints
+    price: Array
 
 
 @dataclass(frozen=True, eq=False)
 class RunningCost:
-    """∫ G dt of a problem's costs, as far as it is a function of chains of samples.
+    """Running cost ∫ G dt of a problem, as a sum over the steps of a chain.
 
-    A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for its place, and τ
-    (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for its motion, with τ = max(Δt, |Δq| / v). v is twice the
-    mean speed of the shortest chain: samples are as far apart as many intervals of a slow drift
-    along the self-motion, so that a change from one sample to the next counts as if it were spread
-    over the time it takes. Costs of accelerations and jerks are left out.
+    A step from q to q + Δq in Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for the configurations and τ
+    (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for the motion, with τ = max(Δt, |Δq| / v) and v twice the
+    mean speed of the shortest chain. Samples are farther apart than a slow self-motion moves in one
+    interval; a step is therefore counted as if it took τ. Costs of accelerations and jerks are left
+    out.
 
     Attributes
     ----------
     formulation : Formulation
     t : (W,)
         Times of the waypoints [s].
-    placed : tuple of Cost
-        Those of q alone.
-    moving : tuple of Cost
-        The others.
+    static_costs : tuple of Cost
+        Costs of the configuration alone.
+    kinetic_costs : tuple of Cost
+        Costs of configuration and velocity.
     weights : (n,)
         Of the joints in |Δq|.
     speed : float
@@ -186,165 +123,147 @@ class RunningCost:
 
     formulation: Formulation
     t: Array
-    placed: tuple[Cost, ...]
-    moving: tuple[Cost, ...]
+    static_costs: tuple[Cost, ...]
+    kinetic_costs: tuple[Cost, ...]
     weights: Array
+    _layer_costs: LayerCache[_LayerCost]
+    _step_costs: LayerCache[_StepCosts]
     speed: float = np.inf
     is_backwards: bool = False
-    _places: dict[int, "_Places"] = field(default_factory=dict, repr=False)
-    _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def by(cls, formulation: Formulation, t: Array) -> "RunningCost":
-        """Return that of the costs over waypoints at times t (W,)."""
+    def of(cls, formulation: Formulation, t: Array) -> "RunningCost":
+        """Return the running cost of a formulation over waypoints at times t (W,)."""
         robot = formulation.robot
         lower, upper = robot.finite_limits()
-        # Several times, since costs may take differences over them.
-        q = lower + (upper - lower) * np.random.default_rng(0).uniform(0.3, 0.7, (8, robot.dof))
+        shares = np.random.default_rng(0).uniform(0.3, 0.7, (_PROBE_SAMPLES, robot.dof))
+        q = lower + (upper - lower) * shares
         sampling = Sampling.trapezoidal(np.linspace(t[0], t[-1], len(q)))
         probe = Samples.along(formulation.problem.follows, sampling, q, 0.1 * q)
-        placed: list[Cost] = []
-        moving: list[Cost] = []
+        static_costs: list[Cost] = []
+        kinetic_costs: list[Cost] = []
         for cost in formulation.costs:
             partials = cost.gradient(probe)
             if partials.qdd is not None or partials.qddd is not None:
                 continue
-            (placed if partials.qd is None else moving).append(cost)
-        weights = formulation.coordinates.weights
-        return cls(formulation, t, tuple(placed), tuple(moving), weights)
+            (static_costs if partials.qd is None else kinetic_costs).append(cost)
+        cached = _CACHED_LAYERS * len(t)
+        return cls(
+            formulation,
+            t,
+            tuple(static_costs),
+            tuple(kinetic_costs),
+            formulation.coordinates.weights,
+            LayerCache(cached),
+            LayerCache(cached),
+        )
 
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    def relaxed_layer(
+        self,
+        k: int,
+        before: Array,
+        cost: Array,
+        after: Array,
+        largest_step: Array,
+        is_unbounded: Flags,
     ) -> tuple[Array, Ints]:
-        """See `Length.extended`."""
+        """See `JointTravel.relaxed_layer`."""
         if self.is_backwards:
-            steps = self.steps(len(self.t) - 2 - k, after, before, step, turning)
+            k = len(self.t) - 2 - k
+            steps = self._steps(k, after, before, largest_step, is_unbounded)
             return cheapest(steps.second, steps.first, steps.price, cost, len(after))
-        steps = self.steps(k, before, after, step, turning)
+        steps = self._steps(k, before, after, largest_step, is_unbounded)
         return cheapest(steps.first, steps.second, steps.price, cost, len(after))
 
-    def steps(self, k: int, before: Array, after: Array, step: Array, turning: Flags) -> "_Steps":
-        """Return the steps that are short enough from waypoint k to the next; see `extended`."""
-        known = self._steps.get((id(before), id(after)))
-        if known is None or known.before is not before or known.after is not after:
-            longest = np.ascontiguousarray(step)
-            first, second = near_pairs(before, after, longest, turning)
-            price = self._prices(k, before, after, first, second, turning)
-            known = _Steps(before, after, first, second, price)
-            _note(self._steps, (id(before), id(after)), known, _LAYERS_KEPT * len(self.t))
-        return known
+    def _steps(
+        self, k: int, before: Array, after: Array, largest_step: Array, is_unbounded: Flags
+    ) -> _StepCosts:
+        """Return the steps that are short enough from waypoint k to the next, with their costs."""
+        steps = self._step_costs.get(before, after)
+        if steps is None:
+            step = np.ascontiguousarray(largest_step)
+            first, second = near_pairs(before, after, step, is_unbounded)
+            price = self._prices(k, before, after, first, second, is_unbounded)
+            steps = _StepCosts(first, second, price)
+            self._step_costs.put(steps, before, after)
+        return steps
 
-    def of(self, q: Array) -> float:
-        """See `Length.of`."""
-        fixed, one = np.zeros(q.shape[1], dtype=bool), np.zeros(1, dtype=np.intp)
+    def cost_of(self, q: Array) -> float:
+        """See `JointTravel.cost_of`."""
+        no_turns, first_index = np.zeros(q.shape[1], dtype=bool), np.zeros(1, dtype=np.intp)
         steps = (
-            self._prices(k, q[k : k + 1], q[k + 1 : k + 2], one, one, fixed)[0]
+            self._prices(k, q[k : k + 1], q[k + 1 : k + 2], first_index, first_index, no_turns)[0]
             for k in range(len(q) - 1)
         )
         return float(sum(steps))
 
-    def backwards(self) -> Self:
-        """See `Length.backwards`."""
+    def reversed(self) -> Self:
+        """See `JointTravel.reversed`."""
         return replace(self, is_backwards=True)
 
-    def at_pace_of(self, q: Array) -> "RunningCost":
-        """Return that for motions about as fast as the shortest one, (W, n)."""
+    def with_speed_of(self, q: Array) -> Self:
+        """Return the measure with v set by the shortest motion (W, n)."""
         moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
         mean = float(moved) / (self.t[-1] - self.t[0])
-        return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
+        speed = _MAX_SPEED_RATIO * mean if mean > 0.0 else np.inf
+        return replace(self, speed=speed, _step_costs=self._step_costs.emptied())
 
     def _prices(
-        self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
+        self, k: int, before: Array, after: Array, first: Ints, second: Ints, is_unbounded: Flags
     ) -> Array:
         """Return the costs of the steps between pairs of vertices, (P,)."""
         duration = float(self.t[k + 1] - self.t[k])
-        here, there = self._at(k, before), self._at(k + 1, after)
-        price = 0.5 * duration * (here.cost[first] + there.cost[second])
-        if not self.moving or not len(first):
+        at_before, at_after = self._layer_cost(k, before), self._layer_cost(k + 1, after)
+        price = 0.5 * duration * (at_before.cost[first] + at_after.cost[second])
+        if not self.kinetic_costs or not len(first):
             return price
-        difference = after[second] - before[first]
-        turn = 2.0 * np.pi
-        difference -= np.where(turning, turn * np.round(difference / turn), 0.0)
+        difference = unturned(after[second] - before[first], is_unbounded)
         moved = np.linalg.norm(self.weights * difference, axis=1)
-        lasting = np.maximum(duration, moved / self.speed)
-        sampling = Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * duration))
-        own = difference[:, : self.formulation.robot.dof]
+        duration_counted = np.maximum(duration, moved / self.speed)
+        joints = difference[:, : self.formulation.robot.dof]
         samples = replace(
-            here.samples,
-            sampling=sampling,
-            q=here.samples.q[first] + 0.5 * own,
-            qd=own / lasting[:, None],
+            at_before.samples,
+            sampling=Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * duration)),
+            q=at_before.samples.q[first] + 0.5 * joints,
+            qd=joints / duration_counted[:, None],
             # The kinematics hardly change within a step.
-            tips=tuple(tip.at(first) for tip in here.samples.tips),
-            task_jacobian=here.samples.task_jacobian[first],
+            tips=tuple(tip.at(first) for tip in at_before.samples.tips),
+            task_jacobian=at_before.samples.task_jacobian[first],
         )
-        at_rest = replace(samples, qd=np.zeros_like(own))
-        moving = sum(cost.value(samples) - cost.value(at_rest) for cost in self.moving)
-        resting = sum(cost.value(at_rest) for cost in self.moving)
-        return np.asarray(price + lasting * moving + duration * resting)
+        at_rest = replace(samples, qd=np.zeros_like(joints))
+        moving = sum(cost.value(samples) - cost.value(at_rest) for cost in self.kinetic_costs)
+        resting = sum(cost.value(at_rest) for cost in self.kinetic_costs)
+        return np.asarray(price + duration_counted * moving + duration * resting)
 
-    def _at(self, k: int, q: Array) -> "_Places":
-        known = self._places.get(id(q))
-        if known is None or known.q is not q:
+    def _layer_cost(self, k: int, q: Array) -> _LayerCost:
+        """Return the samples of a layer (N, n) of waypoint k, and the costs of them alone."""
+        layer_cost = self._layer_costs.get(q)
+        if layer_cost is None:
             sampling = Sampling.trapezoidal(np.full(len(q), self.t[k]))
             # Costs are functions of the arm's joints, which come first.
-            own = q[:, : self.formulation.robot.dof]
+            joints = q[:, : self.formulation.robot.dof]
             follows = self.formulation.problem.follows
-            samples = Samples.along(follows, sampling, own, np.zeros_like(own))
-            cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
-            known = _Places(q, samples, cost)
-            _note(self._places, id(q), known, _LAYERS_KEPT * len(self.t))
-        return known
+            samples = Samples.along(follows, sampling, joints, np.zeros_like(joints))
+            cost = sum((cost.value(samples) for cost in self.static_costs), np.zeros(len(q)))
+            layer_cost = _LayerCost(samples, cost)
+            self._layer_costs.put(layer_cost, q)
+        return layer_cost
 
 
-# Layers are keys of a cache by identity, and kept alive, so that no other one gets their id.
-@dataclass(frozen=True, eq=False)
-class _Places:
-    """A layer (N, n), its samples at rest, and the costs of q alone there, (N,)."""
-
-    q: Array
-    samples: Samples
-    cost: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Steps:
-    """Two layers, the pairs of near vertices (P,), (P,), and the costs of these steps, (P,)."""
-
-    before: Array
-    after: Array
-    first: Ints
-    second: Ints
-    price: Array
-
-
-def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
-    if len(known) >= most:
-        known.clear()
-    known[key] = value
-
-
-def cheapest(
-    first: Ints, second: Ints, price: Array, cost: Array, count: int
-) -> tuple[Array, Ints]:
-    """Return the result of `Length.extended` for pairs of vertices (P,), (P,) with given costs."""
-    reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-    lower_to_cheapest(first, second, price, cost, reach, source)
-    return reach, source
-
-
-Measure = Length | RunningCost
-"""Adds up along chains of configurations, from one waypoint to the next."""
+Measure = JointTravel | RunningCost
+"""A cost of chains that is a sum over their steps."""
 
 
 def measure_of(formulation: Formulation, t: Array, weights: Array) -> Measure:
     """Return the measure of chains over waypoints at times t (W,).
 
-    The costs, or the length with `weights` (n,) where it is all that they ask for.
+    Joint travel with `weights` (n,) where path length is the only cost, or no cost depends on q and
+    q̇ alone; else the running cost.
     """
-    own = RunningCost.by(formulation, t)
-    has_length = all(isinstance(cost, PathLength) for cost in formulation.costs)
+    running_cost = RunningCost.of(formulation, t)
+    is_length = all(isinstance(cost, PathLength) for cost in formulation.costs)
     # Virtual joints have no length.
-    if (has_length and formulation.coordinates.virtual is None) or not (own.placed or own.moving):
-        return Length(weights)
-    return own
+    is_travel = is_length and formulation.coordinates.virtual is None
+    if is_travel or not (running_cost.static_costs or running_cost.kinetic_costs):
+        return JointTravel(weights)
+    return running_cost

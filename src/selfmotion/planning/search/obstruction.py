@@ -11,6 +11,7 @@ from selfmotion.model.follow import deviation_of, limits_within, tip_names
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.search.search_bounds import AT_LIMIT
 from selfmotion.planning.search.single_poses import (
     CLIMBERS,
     MOST_EVALUATED,
@@ -21,7 +22,6 @@ from selfmotion.planning.search.single_poses import (
     search_closely,
 )
 from selfmotion.planning.search.starts import start_candidates
-from selfmotion.planning.search.vertices import AT_LIMIT
 
 # Poses along the path that are tried.
 _POSES = 64
@@ -120,7 +120,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     for _ in range(_SHRINKS):
         q, arrived = wider.project(q, t, far=True)
         q = q[arrived]
-        q = q[wider.bounds.keep(q)]
+        q = q[wider.bounds.is_admissible(q)]
         if not len(q):
             break
         away = deviation_of(follows, more, q)
@@ -158,7 +158,7 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
         )
         q, arrived = wide.project(seeds, t, far=True)
         q = q[arrived]
-        q = q[wide.bounds.keep(q)]
+        q = q[wide.bounds.is_admissible(q)]
         excess = np.maximum(q[:, k] - upper[k], lower[k] - q[:, k])
         if len(q):
             found.append((float(excess.min()), name))

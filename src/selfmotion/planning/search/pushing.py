@@ -15,7 +15,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.model.collision import ClearanceModel
 from selfmotion.model.follow import Follows
 from selfmotion.model.robot import null_space
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.search_bounds import SearchBounds
 
 # Configurations that are moved: those that meet least …
 _MOST = 24
@@ -42,11 +42,11 @@ class Pushing:
     Parameters
     ----------
     follows : Follows
-    bounds : Admissible
+    bounds : SearchBounds
         Limits, and bodies with their required distances.
     """
 
-    def __init__(self, follows: Follows, bounds: Admissible) -> None:
+    def __init__(self, follows: Follows, bounds: SearchBounds) -> None:
         self._follows, self._bounds = follows, bounds
 
     @cached_property
@@ -65,7 +65,7 @@ class Pushing:
         q = self._nearly_free(q)
         for _ in range(_STEPS):
             moved, arrived = project(q + self._steps(q, held))
-            free = moved[arrived][self._bounds.keep(moved[arrived])]
+            free = moved[arrived][self._bounds.is_admissible(moved[arrived])]
             if len(free):
                 return np.asarray(free)
             q = np.where(arrived[:, None], moved, q)

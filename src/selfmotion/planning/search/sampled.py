@@ -6,11 +6,11 @@ from selfmotion.basics import Array, Ints, Progress, kernel
 from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.search.chains import in_order, stations_of
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length
+from selfmotion.planning.search.measures import JointTravel
 from selfmotion.planning.search.pushing import Pushing
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.starts import spread
-from selfmotion.planning.search.vertices import Admissible
 
 # Initial configurations of motions at each station …
 _STARTS = 45
@@ -62,11 +62,11 @@ def sampled_layers(
     rng : Generator or int
     progress : Progress
     """
-    bounds = Admissible(*limits, waypoints.coordinates.is_revolute, bodies)
+    bounds = SearchBounds(*limits, waypoints.coordinates.is_revolute, bodies)
     generator = np.random.default_rng(rng)
     samples = _layers(waypoints, bounds, steps, weights, generator, progress)
 
-    def why(i: int, alive: Array, layer: Array, selected: Admissible) -> str:
+    def why(i: int, alive: Array, layer: Array, selected: SearchBounds) -> str:
         if not len(samples[i]):
             return (
                 "no sample there is within the limits and free; what may help: a smaller "
@@ -82,7 +82,7 @@ def sampled_layers(
 
 def _layers(
     waypoints: OnPath,
-    bounds: Admissible,
+    bounds: SearchBounds,
     largest_step: Array,
     weights: Array,
     rng: np.random.Generator,
@@ -94,10 +94,10 @@ def _layers(
     near these: so there is a detour where smooth motions end.
     """
     smooth = _smooth_motions(waypoints, bounds, rng, progress)
-    turning, pushing = bounds.turning, Pushing(waypoints.follows, bounds)
+    turning, pushing = bounds.is_unbounded, Pushing(waypoints.follows, bounds)
 
     def free(q: Array, i: int) -> Array:
-        selected = q[bounds.keep(q)]
+        selected = q[bounds.is_admissible(q)]
         # Where bodies leave little room, samples miss it; no chain passes one without any.
         if not len(selected) and all(map(len, layers)):
             selected = pushing.free(q, lambda x: waypoints.project(x, i), waypoints.held(i))
@@ -118,7 +118,7 @@ def _layers(
         q, arrived = waypoints.project(guesses, i)
         q = np.concatenate([q[arrived], smooth[i]])
         layers.append(free(q, i))
-        cost, _ = Length(weights).extended(
+        cost, _ = JointTravel(weights).relaxed_layer(
             i - 1, before, cost, layers[-1], largest_step[i - 1], turning
         )
         if not np.any(np.isfinite(cost)):
@@ -128,7 +128,7 @@ def _layers(
 
 
 def _smooth_motions(
-    waypoints: OnPath, bounds: Admissible, rng: np.random.Generator, progress: Progress
+    waypoints: OnPath, bounds: SearchBounds, rng: np.random.Generator, progress: Progress
 ) -> list[Array]:
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = waypoints.coordinates.dof, waypoints.count - 1
@@ -156,12 +156,14 @@ def _spread_out(q: Array, cost: Array, count: int) -> Array:
     return np.asarray(ranked[spread_out(ranked, np.array(_PARENT_DISTANCES), count)])
 
 
-def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
+def _starts(
+    waypoints: OnPath, bounds: SearchBounds, station: int, rng: np.random.Generator
+) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
     seeds = spread(waypoints.coordinates, _START_SEEDS, rng)
     q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
-    free = bounds.keep(q)
+    free = bounds.is_admissible(q)
     return np.concatenate([q[free], q[~free]])[:_STARTS]
 
 

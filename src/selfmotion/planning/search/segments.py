@@ -8,13 +8,14 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search.chains import best_chains, connected, unturned
+from selfmotion.planning.search.chains import best_chains, connected
 from selfmotion.planning.search.guides import layers_of
+from selfmotion.planning.search.layer_steps import cheapest, near_pairs, unturned
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, cheapest, near_pairs
+from selfmotion.planning.search.measures import JointTravel
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.sequences import Layers
-from selfmotion.planning.search.vertices import Admissible
-from selfmotion.problem.problem import given_end
+from selfmotion.problem.problem import prescribed_end
 
 # Cost of a change to another configuration: above that of any motion in between.
 _BREAK = 1e6
@@ -65,13 +66,13 @@ class _Jumps:
             self._most = 0.5 * (max(others, min(jumping)) + others)
         return bool(jumping)
 
-    def extended(
-        self, k: int, length: Length, before: Array, cost: Array, after: Array, turning: Flags
+    def relaxed_layer(
+        self, k: int, length: JointTravel, before: Array, cost: Array, after: Array, turning: Flags
     ) -> tuple[Array, Ints]:
-        """Return `Length.extended` from waypoint k to the next, without steps that jump."""
+        """See `JointTravel.relaxed_layer`; without steps that jump."""
         step = self._most * self._steps[k]
         if k not in self._at:
-            return length.extended(k, before, cost, after, step, turning)
+            return length.relaxed_layer(k, before, cost, after, step, turning)
         first, second = self._taken(k, before, after, turning)
         moved = unturned(after[second] - before[first], turning)
         price = np.abs(moved) @ length.weights
@@ -199,19 +200,19 @@ class ChainSegments:
         """Return the fewest chains without the jumps that are known; see `fewest`."""
         bounds = self._layers.bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
-        any_turn = bounds.without_turns()
+        any_turn = bounds.with_unbounded_turns()
         while True:
             layers = [any_turn.layer(q) for q in self._layers.samples]
-            turning = any_turn.turning
+            turning = any_turn.is_unbounded
             chains = self._chains(layers, any_turn, forbidden)
             motions = [
-                bounds.turned_inside(connected(layers[first : first + len(chain)], chain, turning))
+                bounds.centred(connected(layers[first : first + len(chain)], chain, turning))
                 for first, chain in chains
             ]
-            beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
+            beyond = np.any([bounds.exceeded(q) for q in motions], axis=0)
             if not np.any(beyond):
                 break
-            any_turn = any_turn.counting_turns(beyond, bounds)
+            any_turn = any_turn.with_limits_of(bounds, beyond)
         return [
             ChainSegment(
                 first,
@@ -229,7 +230,7 @@ class ChainSegments:
         if start is not None:
             samples[0] = start[None]
         problem = self.formulation.problem
-        end = given_end(problem.robot, problem.constraints)
+        end = prescribed_end(problem.robot, problem.constraints)
         if end is not None:
             samples[-1] = end[None]
             self._keep_given(-1, "end configuration asked for")
@@ -238,49 +239,52 @@ class ChainSegments:
 
     def _keep_given(self, i: int, name: str) -> None:
         q = self._layers.samples[i]
-        if np.any(self._layers.bounds.beyond(q)):
-            k = int(np.argmax(self._layers.bounds.beyond(q)))
+        if np.any(self._layers.bounds.exceeded(q)):
+            k = int(np.argmax(self._layers.bounds.exceeded(q)))
             joint = self.formulation.robot.joint_names[k]
             raise self._refused(
                 i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits"
             )
-        if not self._layers.bounds.keep(q)[0]:
+        if not self._layers.bounds.is_admissible(q)[0]:
             raise self._refused(i, f"the {name} is in collision, or nearer than asked for")
 
     def _check(self) -> None:
         for i, samples in enumerate(self._layers.samples):
             if len(samples) == 0:
                 raise self._refused(
-                    i, self._layers.why(i, samples, samples, self._layers.bounds.without_turns())
+                    i,
+                    self._layers.why(
+                        i, samples, samples, self._layers.bounds.with_unbounded_turns()
+                    ),
                 )
 
     def _chains(
-        self, layers: list[Array], bounds: Admissible, forbidden: set[int]
+        self, layers: list[Array], bounds: SearchBounds, forbidden: set[int]
     ) -> list[tuple[int, list[int]]]:
         """Return the first waypoint of each chain, and its vertices, first to last."""
-        length, turning = Length(self.formulation.coordinates.weights), bounds.turning
+        length, turning = JointTravel(self.formulation.coordinates.weights), bounds.is_unbounded
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
         parents: list[Ints] = [np.arange(len(cost))]
         # From which vertex of its own waypoint a vertex is changed to; itself where it is not.
         changes: list[Ints] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
-            cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
+            cost, parent = self._jumps.relaxed_layer(i - 1, length, before, cost, after, turning)
             if not np.any(np.isfinite(cost)):
                 raise self._refused(i, self._layers.why(i, before, after, bounds))
             parents.append(parent)
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
-                changed, source = length.extended(i, after, cost, after, anywhere, turning)
+                changed, source = length.relaxed_layer(i, after, cost, after, anywhere, turning)
                 better = changed + _BREAK < cost
                 change = np.where(better, source, change)
                 cost = np.where(better, changed + _BREAK, cost)
             changes.append(change)
         return _traced_back(parents, changes, int(np.argmin(cost)))
 
-    def _ending(self, first: int, layers: list[Array], any_turn: Admissible) -> str:
+    def _ending(self, first: int, layers: list[Array], any_turn: SearchBounds) -> str:
         """Return why no chain from a waypoint on follows the rest of the path."""
-        chains = best_chains(layers[first:], self._layers.steps[first:], any_turn.turning)
+        chains = best_chains(layers[first:], self._layers.steps[first:], any_turn.is_unbounded)
         if chains.blocked is None:
             return "what goes on from there among the samples did not keep all constraints"
         i = first + chains.blocked

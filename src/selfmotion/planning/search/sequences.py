@@ -23,10 +23,11 @@ from selfmotion.planning.search.chains import (
 )
 from selfmotion.planning.search.curves import SPACING, CurveSet, SelfMotion, curves_along
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.measures import Length, Measure, RunningCost
+from selfmotion.planning.search.measures import JointTravel, Measure, RunningCost
+from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.shortest import improved_by
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
-from selfmotion.planning.search.vertices import Admissible, place_vertices
+from selfmotion.planning.search.vertices import place_vertices
 
 # Inverse kinematics is restarted at every 10th waypoint.
 _RESTART_EVERY = 10
@@ -45,7 +46,7 @@ class Layers:
         Their times [s].
     steps : (W - 1, n)
         No joint may move more from one waypoint to the next [rad or m].
-    bounds : Admissible
+    bounds : SearchBounds
     samples : list of (K, n)
         Each at one of its turns.
     why : callable
@@ -56,9 +57,9 @@ class Layers:
     waypoints: OnPath
     t: Array
     steps: Array
-    bounds: Admissible
+    bounds: SearchBounds
     samples: list[Array]
-    why: Callable[[int, Array, Array, Admissible], str]
+    why: Callable[[int, Array, Array, SearchBounds], str]
 
     def refused(self, i: int, reason: str, parts: str = "") -> NoSequenceError:
         """Return the error that no motion, in any number of parts, passes waypoint i."""
@@ -102,12 +103,12 @@ def curve_layers(
         Called with the present waypoint.
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
-    bounds = Admissible(*limits, motion.revolute, bodies)
+    bounds = SearchBounds(*limits, motion.revolute, bodies)
     seeds = spread(follows.coordinates, TRACING_SEEDS, np.random.default_rng(rng))
     curves = curves_along(motion, x, seeds, _RESTART_EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
 
-    def why(i: int, alive: Array, layer: Array, kept: Admissible) -> str:
+    def why(i: int, alive: Array, layer: Array, kept: SearchBounds) -> str:
         return why_blocked(motion, x[i], curves[i], alive, layer, kept, steps[max(i - 1, 0)])
 
     return Layers(OnPath(follows, t, *limits), t, steps, bounds, samples, why)
@@ -147,7 +148,7 @@ def best_sequences(
     rough, turning, measure = _rough_motions(layers, given)
     better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
     stages = [("search: optimising finalist", False)]
-    if isinstance(measure, Length):
+    if isinstance(measure, JointTravel):
         # Lengths of chains predict those of the shortest ones nearby badly; a rough stage does it
         # well.
         stages.insert(0, ("search: optimising sequence", True))
@@ -170,10 +171,14 @@ def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array]
     as a whole; if it does not fit, the search is repeated with all turns of these joints.
     """
     bounds = vertices.bounds
-    length = given if isinstance(given, Length) else Length(vertices.waypoints.coordinates.weights)
-    any_turn = bounds.without_turns()
+    length = (
+        given
+        if isinstance(given, JointTravel)
+        else JointTravel(vertices.waypoints.coordinates.weights)
+    )
+    any_turn = bounds.with_unbounded_turns()
     while True:
-        layers, turning = [any_turn.layer(q) for q in vertices.samples], any_turn.turning
+        layers, turning = [any_turn.layer(q) for q in vertices.samples], any_turn.is_unbounded
         chains = best_chains(layers, vertices.steps, turning, length)
         if chains.blocked is not None:
             i = chains.blocked
@@ -182,18 +187,18 @@ def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array]
         measure: Measure = length
         if isinstance(given, RunningCost):
             shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
-            measure = given.at_pace_of(connected(layers, shortest, turning))
+            measure = given.with_speed_of(connected(layers, shortest, turning))
             chains = best_chains(layers, vertices.steps, turning, measure)
         found = diverse_chains(layers, chains, vertices.steps, turning, _CANDIDATES, measure)
-        rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]
-        beyond = bounds.beyond(rough[0])
+        rough = [bounds.centred(connected(layers, q, turning)) for q in found]
+        beyond = bounds.exceeded(rough[0])
         if not np.any(beyond):
-            return [q for q in rough if not np.any(bounds.beyond(q))], turning, measure
-        any_turn = any_turn.counting_turns(beyond, bounds)
+            return [q for q in rough if not np.any(bounds.exceeded(q))], turning, measure
+        any_turn = any_turn.with_limits_of(bounds, beyond)
 
 
 def _free_samples(
-    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Admissible, progress: Progress
+    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: SearchBounds, progress: Progress
 ) -> list[Array]:
     """Return the free samples of the curves at every waypoint, without turns."""
     found: list[Array] = []

@@ -17,8 +17,8 @@ from selfmotion.model.collision import ClearanceModel, CollisionModel
 from selfmotion.planning.optimise import Banded
 from selfmotion.planning.search.chains import best_chains, connected, in_order
 from selfmotion.planning.search.manifold import LONGEST_CORRECTION, OnPath
-from selfmotion.planning.search.measures import Length, Measure
-from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
+from selfmotion.planning.search.measures import JointTravel, Measure
+from selfmotion.planning.search.search_bounds import AT_LIMIT, SearchBounds
 
 # δ of the stages, as multiples of the chain's mean step.
 SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
@@ -65,7 +65,7 @@ class Shortest:
     Parameters
     ----------
     waypoints : OnPath
-    bounds : Admissible
+    bounds : SearchBounds
         Conditions on each configuration.
     largest_step : (W - 1, n)
         No joint may move more from one waypoint to the next [rad or m].
@@ -74,7 +74,7 @@ class Shortest:
     """
 
     def __init__(
-        self, waypoints: OnPath, bounds: Admissible, largest_step: Array, weights: Array
+        self, waypoints: OnPath, bounds: SearchBounds, largest_step: Array, weights: Array
     ) -> None:
         self._waypoints, self._bounds, self._weights = waypoints, bounds, weights
         self._largest, self._kept = largest_step, _STEP_KEPT * largest_step
@@ -86,7 +86,7 @@ class Shortest:
         In stages with these δ, as multiples of the mean step of q. Configurations of q in collision
         are moved away first where possible, whatever the length.
         """
-        self._free = self._bounds.keep(q)
+        self._free = self._bounds.is_admissible(q)
         self._watched = ~self._free
         best, here, reach, free = q, q, LONGEST_CORRECTION, self._free.sum()
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
@@ -127,7 +127,7 @@ class Shortest:
             q, arrived = self._waypoints.project_each(guess, every)
             arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
             free = arrived.copy()
-            free[arrived] = self._bounds.keep(q[arrived])
+            free[arrived] = self._bounds.is_admissible(q[arrived])
             arrived &= free | ~self._free
             if not (arrived | blocked).all():
                 self._watched |= ~arrived
@@ -259,7 +259,7 @@ def _smooth(model: CollisionModel, distance: float) -> tuple[ClearanceModel, flo
 
 
 def improved_by(
-    waypoints: OnPath, bounds: Admissible, largest_step: Array, measure: Measure
+    waypoints: OnPath, bounds: SearchBounds, largest_step: Array, measure: Measure
 ) -> Callable[[Array, bool], Array]:
     """Return a better chain near q (W, n), never a worse one; shorter ones also roughly.
 
@@ -267,7 +267,7 @@ def improved_by(
     have to be near enough.
     """
     arguments = waypoints, bounds, largest_step, measure
-    if not isinstance(measure, Length):
+    if not isinstance(measure, JointTravel):
         return lambda q, _: _cheaper(*arguments, q, _ROUGH_RINGS, _ROUGH_SIDE)
     shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
 
@@ -282,7 +282,7 @@ def improved_by(
 
 def _cheaper(
     waypoints: OnPath,
-    bounds: Admissible,
+    bounds: SearchBounds,
     largest_step: Array,
     measure: Measure,
     q: Array,
@@ -291,7 +291,7 @@ def _cheaper(
 ) -> Array:
     """Return a cheaper chain by dynamic programming over samples around q (W, n), ever nearer."""
     fixed = np.zeros(q.shape[1], dtype=bool)
-    cost = measure.of(q)
+    cost = measure.cost_of(q)
     for ring in rings:
         for _ in range(_ROUNDS):
             layers = _around(waypoints, bounds, q, ring * np.arange(1.0, side + 1.0))
@@ -304,7 +304,7 @@ def _cheaper(
     return q
 
 
-def _around(waypoints: OnPath, bounds: Admissible, q: Array, away: Array) -> list[Array]:
+def _around(waypoints: OnPath, bounds: SearchBounds, q: Array, away: Array) -> list[Array]:
     """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
 
     At distances `away` (S,) to both sides along each axis of a null-space basis that is carried
@@ -318,7 +318,7 @@ def _around(waypoints: OnPath, bounds: Admissible, q: Array, away: Array) -> lis
     found, arrived = waypoints.project_each(flat, np.repeat(np.arange(len(q)), moves.shape[1]))
     # Far corrections lead elsewhere.
     arrived &= np.linalg.norm(found - flat, axis=1) < 1.5 * away[0]
-    arrived[arrived] = bounds.keep(found[arrived])
+    arrived[arrived] = bounds.is_admissible(found[arrived])
     found, kept = found.reshape(guesses.shape), arrived.reshape(guesses.shape[:2])
     layers = [
         np.concatenate([here[None], near[free]])

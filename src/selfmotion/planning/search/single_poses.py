@@ -12,8 +12,8 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold, carry
 from selfmotion.planning.search.pushing import Pushing
+from selfmotion.planning.search.search_bounds import AT_LIMIT, SearchBounds
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
-from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
 from selfmotion.problem.problem import Problem
 
 # Branches of solutions that are followed from one pose to the next.
@@ -83,7 +83,7 @@ class SinglePoses:
         self.follows = within_limits(formulation.follows, required.lower, required.upper)
         self.coordinates = self.follows.coordinates
         self._manifold = Manifold(self.follows, required.lower, required.upper)
-        self.bounds = Admissible(
+        self.bounds = SearchBounds(
             required.lower,
             required.upper,
             self.coordinates.is_revolute,
@@ -134,11 +134,11 @@ class SinglePoses:
     def solve(self, t: float, known: Array) -> Found:
         """Return the solutions at t [s] from configurations nearby (K, n), and from anywhere."""
         near = self._reached(t, known[:_BRANCHES])
-        free = near[self.bounds.keep(near)]
+        free = near[self.bounds.is_admissible(near)]
         if len(free):
             return Found(free, near[:0], len(known[:_BRANCHES]))
         far = self._reached(t, self._seeds, far=True)
-        free = far[self.bounds.keep(far)]
+        free = far[self.bounds.is_admissible(far)]
         return Found(free, np.concatenate([near, far]), len(known[:_BRANCHES]) + len(self._seeds))
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
@@ -176,7 +176,7 @@ def first_blocked(poses: SinglePoses, times: Array) -> float | None:
         found = poses.solve(t, known)
         if not len(found.free):
             q = poses._by_damped_steps(t, _APPROACHED)
-            found = replace(found, free=q[poses.bounds.keep(q)])
+            found = replace(found, free=q[poses.bounds.is_admissible(q)])
         if not len(found.free):
             return float(t)
         known = found.free
@@ -188,18 +188,18 @@ def search_closely(poses: SinglePoses, t: float, before: Found) -> Found:
     seeds = spread(poses.coordinates, _MORE_SEEDS, poses._rng)
     far = poses._reached(t, seeds, far=True)
     tries = before.tries + len(seeds)
-    free = far[poses.bounds.keep(far)]
+    free = far[poses.bounds.is_admissible(far)]
     met = np.concatenate([before.met, far])
     if len(free):
         return Found(free, met, tries)
     slowly = poses._by_damped_steps(t, _MORE_APPROACHED)
     tries += _MORE_APPROACHED
-    free, met = slowly[poses.bounds.keep(slowly)], np.concatenate([met, slowly])
+    free, met = slowly[poses.bounds.is_admissible(slowly)], np.concatenate([met, slowly])
     if len(free) or not len(met):
         return Found(free, met, tries)
     for more in (pushed, _along_curves, _wandered, _climbed):
         q = more(poses, t, met)
-        free, met = q[poses.bounds.keep(q)], np.concatenate([met, q])
+        free, met = q[poses.bounds.is_admissible(q)], np.concatenate([met, q])
         tries += len(q)
         if len(free):
             break
@@ -260,7 +260,7 @@ def _wandered(poses: SinglePoses, t: float, met: Array) -> Array:
         away = poses._rng.normal(size=here.shape) * size / poses.coordinates.weights
         found, arrived = poses.project(here + away, t)
         known = np.concatenate([known, found[arrived]])
-        if poses.bounds.keep(found[arrived]).any():
+        if poses.bounds.is_admissible(found[arrived]).any():
             break
     return np.asarray(known[len(met) :])
 

@@ -6,11 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, InverseKinematicsError
-from selfmotion.model.follow import Coordinates, Follows, has_windows, is_plain, only_tip, tip_names
+from selfmotion.model.follow import (
+    Coordinates,
+    Follows,
+    has_windows,
+    is_plain,
+    single_tip,
+    tip_names,
+)
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold, carry
-from selfmotion.planning.search.vertices import Admissible
+from selfmotion.planning.search.search_bounds import SearchBounds
 
 # Seeds where all self-motions of the first pose can be traced.
 TRACING_SEEDS = 60
@@ -85,7 +92,7 @@ def start_candidates(
         # Many more attempts, and an error that names the distance.
         found = [
             follows.robot.inverse_kinematics(
-                only_tip(follows).path.pose(time), only_tip(follows).task, rng=rng
+                single_tip(follows).path.pose(time), single_tip(follows).task, rng=rng
             )
         ]
     return found
@@ -100,17 +107,17 @@ def _along_curves(
 ) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
     own, motion = follows.coordinates, SelfMotion(follows, SPACING)
-    bounds = Admissible(own.lower, own.upper, motion.revolute, ())
+    bounds = SearchBounds(own.lower, own.upper, motion.revolute, ())
     curves = motion.curves(
         follows.targets(np.array([time]))[0], spread(own, TRACING_SEEDS, rng)
     ).curves
     # The last sample of a closed curve equals its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
-    inside = [q[bounds.free(q) & admits(q)] for q in samples]
+    inside = [q[bounds.is_admissible_modulo_turns(q) & admits(q)] for q in samples]
     total = sum(map(len, inside))
     stride = max(1, -(-total // count))
     every = np.concatenate([np.empty((0, own.dof)), *inside])[::stride]
-    return [bounds.turned_inside(q[None])[0] for q in bounds.representative(every)]
+    return [bounds.centred(q[None])[0] for q in bounds.representative(every)]
 
 
 def _scattered(

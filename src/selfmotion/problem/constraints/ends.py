@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
-from selfmotion.model.follow import Follows, row_names_of
+from selfmotion.model.follow import Follows, row_names
 from selfmotion.model.path import REST_SPEED
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints.base import Constraint, Ends
@@ -144,7 +144,7 @@ class StartVelocity(_EndRate, order=1, at_start=True):
             begins = round(float(twist[row]), 9) + 0.0
             raise ProblemError(
                 f"the start velocity moves '{robot.tool}' at {moved[row]:.6g} m/s or rad/s in row "
-                f"'{row_names_of(follows)[row]}', but the path begins at {begins:g}; give "
+                f"'{row_names(follows)[row]}', but the path begins at {begins:g}; give "
                 f"the path that speed, or the arm another one"
             )
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_numbers, as_whole, read_only, shown
-from selfmotion.model.follow import Follows, row_names_of
+from selfmotion.model.follow import Follows, row_names
 from selfmotion.problem.costs.base import Cost, Partials, check_mu
 from selfmotion.problem.costs.samples import Samples
 
@@ -126,7 +126,7 @@ class DirectionalManipulability(Cost):
         if len(np.asarray(self.direction)) != rows:
             raise ProblemError(
                 f"cost '{self.name}': direction has {len(np.asarray(self.direction))} entries, "
-                f"expected one per prescribed row ({rows}: {', '.join(row_names_of(follows))})"
+                f"expected one per prescribed row ({rows}: {', '.join(row_names(follows))})"
             )
 
     def _solved(self, samples: Samples) -> Array:

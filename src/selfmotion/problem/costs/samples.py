@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model import kernels
-from selfmotion.model.follow import Follows, every_column
+from selfmotion.model.follow import Follows, joint_columns
 from selfmotion.model.motion import Sampling
 from selfmotion.model.task import Task
 
@@ -158,7 +158,7 @@ class Samples:
     def contract(self, weights: Array) -> Array:
         """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
         weights, layout = np.ascontiguousarray(weights), self.follows.layout
-        every = every_column(self.follows, self.q)
+        every = joint_columns(self.follows, self.q)
         parts = [
             kernels.contract_task(tip.jacobian, tip.rotation, weights, layout, f, every)
             for f, tip in enumerate(self.tips)

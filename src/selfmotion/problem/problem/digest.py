@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from selfmotion.basics import description_of, digest_of, digest_of_file
 from selfmotion.model.robot import mesh_digests
 from selfmotion.problem.constraints import Constraint
-from selfmotion.problem.problem.along import envelope_without_arm
+from selfmotion.problem.problem.envelopes import envelope_without_arm
 
 if TYPE_CHECKING:
     from selfmotion.problem.problem.problem import Problem

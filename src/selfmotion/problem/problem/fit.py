@@ -21,7 +21,7 @@ from selfmotion.model.follow import (
     Follow,
     Follows,
     VirtualJoints,
-    row_names_of,
+    row_names,
     with_tolerances,
 )
 from selfmotion.model.motion import FreeNullMotion, NullMotion
@@ -403,7 +403,7 @@ def _check_several(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
                 f"which '{item.chain.tip_name}' does not; choose another one (Follow(task=))"
             )
     if robot.dof - left < rows and not _can_with(follows, relaxations):
-        names = ", ".join(row_names_of(follows))
+        names = ", ".join(row_names(follows))
         raise ProblemError(
             f"{robot.name}: {what} have {rows} rows prescribed ({names}), but {robot.dof} joints "
             f"cannot move them freely in all of these; prescribe fewer (Follow(task=))"

@@ -15,15 +15,15 @@ def sample_problem(
 ) -> Problem:
     """Return the paper's sample problem (section 3.1): a planar arm through the origin.
 
-    Links 2, 2, 1; q(0) = [0, π/2, -π/2] (eq. 15); ẋ = [-3π sin πt, -2π sin πt] (eq. 16), so that
-    x(t) = (3 cos πt, 2 cos πt); costs ½ q̇ᵀq̇ + μ / det(JJᵀ) (eq. 12).
+    Links of 2, 2 and 1 m; q(0) = [0, π/2, -π/2] (eq. 15); ẋ = [-3π sin πt, -2π sin πt] (eq. 16),
+    so that x(t) = (3 cos πt, 2 cos πt); costs ½ q̇ᵀq̇ + μ / det(JJᵀ) (eq. 12).
 
     Parameters
     ----------
     mu : float
-        μ.
+        Weight μ of the singularity term, 1 / det(JJᵀ).
     duration : float
-        [s]; 1 for one way, 2 for the way and back.
+        Duration [s]: 1 for the way there, 2 for the way there and back.
     null_motion : NullMotion, optional
         Default: cubic in the null space. The paper's own is
         ``PolynomialNullMotion(degree=3, space="joint", basis="monomial")``.
@@ -41,6 +41,6 @@ def sample_problem(
         start=start,
         null_motion=null_motion or PolynomialNullMotion(),
         costs=(JointVelocity(), InverseManipulability(mu)),
-        # The paper's arm moves when the tool does not yet.
+        # The paper's arm already moves while the tool is still at rest.
         rest=False,
     )

@@ -39,18 +39,13 @@ from selfmotion.problem.constraints import (
     NO_OVERLAP,
     Clearance,
     Constraint,
-    Envelope,
     as_clearances,
     separate_clearances,
 )
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
-from selfmotion.problem.problem.along import (
-    arm_rest_orders,
-    envelope_of,
-    envelope_without_arm,
-    given_end,
-)
 from selfmotion.problem.problem.digest import conditions_digest
+from selfmotion.problem.problem.end_constraints import prescribed_end
+from selfmotion.problem.problem.envelopes import envelope_of_problem, envelope_without_arm
 from selfmotion.problem.problem.fit import (
     ANY_NULL_MOTION,
     KEPT,
@@ -67,6 +62,7 @@ from selfmotion.problem.problem.fit import (
 )
 from selfmotion.problem.problem.of_start import misses_of_start, too_near_at
 from selfmotion.problem.problem.remarks import remarks_on
+from selfmotion.problem.problem.rest import arm_rest_orders
 
 # Stiffness of springs that hold joints of a damped motion within limits, in shares of a limit of
 # speed, or radians.
@@ -186,7 +182,7 @@ class Problem:
         check_costs(self.follows, self.costs, self.all_costs)
         for item in self.constraints:
             item.check(self.follows)
-            end = given_end(self.robot, [item])
+            end = prescribed_end(self.robot, [item])
             if end is not None:
                 check_end(self.follows, end, self.relaxations)
         # Now, not when the motion is finished: without a requirement nothing judges it.
@@ -246,7 +242,7 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        kept = envelope_of(self.robot, self.all_constraints)
+        kept = envelope_of_problem(self)
         limits = BeyondLimits(_BEYOND_LIMITS, kept.lower, kept.upper, kept.speed)
         return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
@@ -286,7 +282,7 @@ class Problem:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes before planning: overlapping links, suspicious limits or placements."""
-        envelope = envelope_of(self.robot, self.all_constraints)
+        envelope = envelope_of_problem(self)
         found = remarks_on(self.robot, self.follows, self.constraints, self.requirements, envelope)
         return tuple(dict.fromkeys(found))
 
@@ -366,11 +362,6 @@ def _rest(problem: Problem, start: int, end: int) -> tuple[Requirement, ...]:
 
 # Signature in help() of a field that is a descriptor.
 Problem.__init__.__annotations__["task"] = "Task | str"
-
-
-def envelope_of_problem(problem: Problem) -> Envelope:
-    """Return the envelope of a problem's constraints and of its arm's own limits."""
-    return envelope_of(problem.robot, problem.all_constraints)
 
 
 def check_feeds_of(problem: Problem) -> None:

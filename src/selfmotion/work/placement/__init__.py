@@ -1,6 +1,6 @@
 """Where to put the part, or the arm."""
 
-from selfmotion.work.placement.corners import (
+from selfmotion.work.placement.correction_range import (
     Corner as Corner,
     Correction as Correction,
     CorrectionSide as CorrectionSide,
