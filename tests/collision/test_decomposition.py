@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from selfmotion.model.collision import Box, ClearanceModel, CollisionModel, Mesh, Solid
-from selfmotion.model.collision.decomposition import MOST, convex_pieces
+from selfmotion.model.collision.decomposition import MAX_PIECES, convex_pieces
 from selfmotion.model.robot import load_robot
 from support.arms import PANDA_HOME
 
@@ -86,7 +86,7 @@ SOLIDS = {
         lambda: trimesh.util.concatenate(
             [bar((i % 8, i // 8, 0), (0.5, 0.5, 0.5)) for i in range(48)]
         ),
-        MOST,
+        MAX_PIECES,
         2.5,
     ),
 }

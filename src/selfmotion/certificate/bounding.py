@@ -29,7 +29,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ChainSeries, RobotModel
 
 # Nodes of an interval are multiples of this: few numbers, of which each takes a pass of its own.
-_FEWEST = 3
+_NODES_STEP = 3
 # Nodes of an interval without a majorant.
 _MEASURED = 9
 # Points of an interval at which polynomials are evaluated.
@@ -41,7 +41,7 @@ _DEPTH = 16
 # Largest number of intervals in work per chunk, in multiples of its own …
 _TIMES = 32
 # … or this many, whichever is more.
-_MOST = 4096
+_MIN_CHUNK = 4096
 
 
 class MotionSegments:
@@ -198,7 +198,7 @@ def _decided(
             progress("checking", number, len(chunks))
         part = edges[first : first + _CHUNK + 1]
         pending = np.stack([part[:-1], part[1:]], axis=1)
-        most = max(_MOST, _TIMES * len(pending))
+        most = max(_MIN_CHUNK, _TIMES * len(pending))
         for depth in range(_DEPTH + 1):
             found = _measured(function, MotionSegments(robot, trajectory, pending))
             # Written so that NaN settles nothing and is no small error either.
@@ -243,7 +243,7 @@ def _measured(function: BoundedFunction, segments: MotionSegments) -> _Found:
 
 def _nodes(known: Array, function: BoundedFunction) -> tuple[Ints, Array]:
     """Return the number of nodes of each interval (I,), and interpolation errors (B, I)."""
-    powers = np.arange(_FEWEST, series.ORDER + 1, _FEWEST)
+    powers = np.arange(_NODES_STEP, series.ORDER + 1, _NODES_STEP)
     errors = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
     good = (errors <= function.wanted[:, None, None]).all(axis=0)
     limits = np.full(len(function.blocks), np.inf)

@@ -48,7 +48,7 @@ _CLOSER = 4
 # Limit that counts where a joint may not move, for the least time of a path [rad/s or m/s].
 _SLOWEST = 1e-3
 # Shares above this are reported as this: the limit is 0 there.
-_MOST = 1e6
+_MAX_SHARE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +124,8 @@ class BrakingCurves:
         lower, upper = self.velocities(q)
         limit = np.where(qd > 0.0, upper, -lower)
         size = np.abs(qd)
-        used = np.minimum(size, _MOST * limit) / np.where(limit > 0.0, limit, 1.0)
-        return np.where(size <= _STILL, 0.0, np.where(limit > 0.0, used, _MOST))
+        used = np.minimum(size, _MAX_SHARE * limit) / np.where(limit > 0.0, limit, 1.0)
+        return np.where(size <= _STILL, 0.0, np.where(limit > 0.0, used, _MAX_SHARE))
 
     def _stopping(self, qd: Array) -> Array:
         return np.asarray(np.maximum(qd + self.offset, 0.0) ** 2 / (2.0 * self.deceleration))
@@ -264,7 +264,7 @@ class VelocityByPosition(Requirement):
         if not kept and share <= 1.0:
             text = f"whether {self.name} hold is not decided near t = {time:.6g} s: {text}"
         # At a slower pace velocities fall, and the limits of the same positions stay.
-        finite = share < _MOST
+        finite = share < _MAX_SHARE
         factor = 1.0 if kept else max(share, 1.0) if finite and share > 1.0 else np.inf
         if 1.0 < factor < np.inf:
             text += f": give it {factor:.5g} times the duration"

@@ -39,7 +39,7 @@ from selfmotion.model.task import DampingLaw, Relaxation, Task
 
 # Samples at which the distance from singular poses, which proves nothing, is computed on a long
 # motion; then at all times around its smallest values.
-_MOST_POSES = 2_000
+_MAX_POSES = 2_000
 # A motion may end this much before or after its path [s], since files write times with some digits;
 # then all has to be within the tolerance until both have ended.
 _CLOCK = 1e-4
@@ -227,7 +227,7 @@ def _near_singular(follows: Follows, trajectory: Trajectory, t: Array) -> Array:
     Around values that are, minus their change nearby, below the least of all: of several loops each
     has a minimum.
     """
-    every = 1 + len(t) // _MOST_POSES
+    every = 1 + len(t) // _MAX_POSES
     if every == 1:
         return t
     few = smallest_singular_values(follows, trajectory(t[::every]))

@@ -23,7 +23,7 @@ _DEPTH = 40
 # … of which so many are done at once at most, or one where there are more intervals than this.
 _AT_ONCE, _MANY = 3, 4096
 # Largest number of intervals at once: the others are undecided.
-_MOST = 200_000
+_MAX_INTERVALS = 200_000
 # Intervals in one chunk, which bounds memory.
 _CHUNK = 4096
 # Hulls are used in place of meshes, which are slow, for pairs that more divisions decide: share
@@ -210,7 +210,7 @@ def closest_at_all_times(
         rows, some = (np.flatnonzero(~decided.all(axis=axis)) for axis in (1, 0))
         if not rows.size or approach.closest.value < distance:
             return approach
-        if len(rows) > _MOST:
+        if len(rows) > _MAX_INTERVALS:
             break
         # Decided pairs need no number.
         pairs, lever_arms = pairs[some], lever_arms[some]

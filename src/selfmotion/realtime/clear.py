@@ -17,7 +17,7 @@ from selfmotion.realtime.settings import (
     FIRST_OF_MESHES,
     LEAVING,
     LEVEL,
-    MOST_CHECKS,
+    MAX_CHECKS,
     NEARER,
 )
 
@@ -299,7 +299,7 @@ def _bisected(
         middle = (first[open_] + last[open_]) // 2
         broken = ~inside.all(axis=1)
         count += len(middle)
-        if broken.any() or count > MOST_CHECKS or (middle == first[open_]).any():
+        if broken.any() or count > MAX_CHECKS or (middle == first[open_]).any():
             row = int(np.argmax(broken)) if broken.any() else int(open_[0])
             pair = int(np.argmin(np.minimum(near, then)[row] - need))
             return int(last[row]), pair, float(min(near[row, pair], then[row, pair]))

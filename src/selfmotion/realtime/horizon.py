@@ -23,8 +23,8 @@ from selfmotion.realtime.settings import (
     DISTANCES,
     GUESS_LESS,
     GUESS_MORE,
-    LEAST_GUESS,
-    MOST_GUESS,
+    MAX_GUESS,
+    MIN_GUESS,
     NODE_STEP,
     PIVOT,
     REACH,
@@ -328,9 +328,9 @@ class Horizon:
         self.breakdown = np.inf
         ratio = fall / predicted if np.isfinite(fall) else -np.inf
         if not ratio >= BADLY:
-            self._damping = min(GUESS_MORE * self._damping, MOST_GUESS)
+            self._damping = min(GUESS_MORE * self._damping, MAX_GUESS)
         elif ratio > WELL:
-            self._damping = max(GUESS_LESS * self._damping, LEAST_GUESS)
+            self._damping = max(GUESS_LESS * self._damping, MIN_GUESS)
         return bool(ratio > 0.0)
 
     def _begin(self, q: Array) -> bool:

@@ -60,9 +60,9 @@ GUESS_LESS = 0.3
 # … factor after a smaller one …
 GUESS_MORE = 4.0
 # … smallest multiple …
-LEAST_GUESS = 1e-3
+MIN_GUESS = 1e-3
 # … and largest.
-MOST_GUESS = 1e6
+MAX_GUESS = 1e6
 # Ratio of the decrease to the predicted one that counts as good …
 WELL = 0.75
 # … and as bad.
@@ -96,4 +96,4 @@ FIRST_CHECKS = 4
 # … of such pairs, which take a hundred times as long …
 FIRST_OF_MESHES = 1
 # … and largest number of configurations that are measured for it: they take time.
-MOST_CHECKS = 96
+MAX_CHECKS = 96

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array
 
 # Largest number of pieces: each is a pair with each link.
-MOST = 32
+MAX_PIECES = 32
 # A part is cut while its hull adds more than this share of the whole hull's volume.
 _EXCESS = 2e-3
 # Two are joined where their common hull adds less than this share.
@@ -39,7 +39,7 @@ _SAME_PLACE = 0.01
 # Smallest extent of a solid on both sides of a plane that cuts it [share of the size].
 _CUTS = 2e-3
 # Meshes of more triangles are not cut, which would take above half a minute.
-_MOST_TRIANGLES = 100_000
+_MAX_TRIANGLES = 100_000
 # Nearest pieces of each piece that are candidates for joining it.
 _NEIGHBOURS = 10
 # Factor by which a cut with two small remainders is preferred to one with a large one.
@@ -75,7 +75,7 @@ class _Part:
 
 
 def convex_pieces(corners: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, ...]:
-    """Return the corners (V, 3) of at most `MOST` convex pieces that together contain a mesh.
+    """Return the corners (V, 3) of at most `MAX_PIECES` convex pieces that together contain a mesh.
 
     Empty where the mesh is not closed, or has more than 100,000 triangles.
 
@@ -87,7 +87,7 @@ def convex_pieces(corners: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, 
     """
     import manifold3d
 
-    if len(faces) > _MOST_TRIANGLES:
+    if len(faces) > _MAX_TRIANGLES:
         return ()
     shells = _shells(faces)
     # Shells that touch share no corners.
@@ -128,7 +128,7 @@ def _cut(solid: Any, whole: float) -> list[_Part]:
     queue = [(-part.excess, next(order), part) for part in _connected(solid)]
     heapq.heapify(queue)
     # Fine parts are joined again, so that more than the limit are allowed here.
-    while len(queue) < 2 * MOST and -queue[0][0] > _EXCESS * whole:
+    while len(queue) < 2 * MAX_PIECES and -queue[0][0] > _EXCESS * whole:
         _, _, worst = heapq.heappop(queue)
         for part in _best_cut(worst):
             heapq.heappush(queue, (-part.excess, next(order), part))
@@ -188,7 +188,7 @@ def _planes(part: _Part) -> Iterator[tuple[Array, float, float]]:
 
 
 def _joined(parts: list[_Part], whole: float) -> list[_Part]:
-    """Return parts, some joined: where that adds little, and until there are at most `MOST`."""
+    """Return parts, joined where that adds little, and until there are at most `MAX_PIECES`."""
     alive, order = dict(enumerate(parts)), itertools.count(len(parts))
     costs: dict[tuple[int, int], tuple[float, _Part]] = {}
 
@@ -205,7 +205,7 @@ def _joined(parts: list[_Part], whole: float) -> list[_Part]:
         weigh(i)
     while costs:
         (i, j), (added, both) = min(costs.items(), key=lambda item: (item[1][0], item[0]))
-        if added > _JOINED * whole and len(alive) <= MOST:
+        if added > _JOINED * whole and len(alive) <= MAX_PIECES:
             break
         del alive[i], alive[j]
         for pair in [pair for pair in costs if {i, j} & set(pair)]:

@@ -19,7 +19,7 @@ SAMPLES = 500
 # Share of configurations from which on an overlap may be by design …
 _NEARLY_ALWAYS = 0.95
 # … if this share of its depths is alike: what comes out of a tube overlaps ever less …
-_MOST = 0.75
+_MIN_ALIKE_SHARE = 0.75
 # … which means within this share of the median depth.
 _ALIKE_DEPTHS = 0.25
 
@@ -97,7 +97,7 @@ def _is_by_design(met: int, depths: Array | None) -> bool:
         return met == SAMPLES
     usual = np.median(depths)
     alike = np.abs(depths - usual) <= _ALIKE_DEPTHS * usual
-    return bool(alike.mean() >= _MOST)
+    return bool(alike.mean() >= _MIN_ALIKE_SHARE)
 
 
 def count_overlaps(

@@ -22,13 +22,13 @@ _HALF_THICKNESS = 1e-6
 # Tolerance for a point to be in a piece [share of the size].
 _INSIDE = 1e-6
 # Largest number of points that are checked for it.
-_MOST_CHECKED = 20_000
+_MAX_CHECKED = 20_000
 # Points outside of all pieces by more than this belong to a lost part, not to a sliver [share].
 _SLIVER = 1e-2
 # Cache of decompositions: each model of a cell needs them.
 _cut: "dict[tuple[bytes, bytes], tuple[Solid, ...]]" = {}
 # Largest number of these.
-_MOST_CUT = 32
+_MAX_CUT = 32
 # coal rejects hulls with a corner of 255 neighbours or more.
 _NEIGHBOURS = 250
 
@@ -141,7 +141,7 @@ class Solid:
         key = self._corners.tobytes(), self._welded.tobytes()
         if key not in _cut:
             _cut[key] = self._cover()
-            while len(_cut) > _MOST_CUT:
+            while len(_cut) > _MAX_CUT:
                 del _cut[next(iter(_cut))]
         return _cut[key] or (self,)
 
@@ -150,7 +150,7 @@ class Solid:
         from selfmotion.model.collision.decomposition import convex_pieces
 
         points = np.concatenate([self._corners, self._triangles.mean(axis=1)])
-        points = points[:: -(-len(points) // _MOST_CHECKED)]
+        points = points[:: -(-len(points) // _MAX_CHECKED)]
         size = float(np.ptp(self._corners, axis=0).max())
         pieces = list(convex_pieces(self._corners, self._welded))
         try:

@@ -17,7 +17,7 @@ from selfmotion.model.motion.spline import (
     hermite as hermite,
 )
 from selfmotion.model.motion.trajectory import (
-    MOST_SAMPLES as MOST_SAMPLES,
+    MAX_SAMPLES as MAX_SAMPLES,
     Evaluation as Evaluation,
     Trajectory as Trajectory,
     column_names as column_names,

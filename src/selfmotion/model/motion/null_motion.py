@@ -25,7 +25,7 @@ from selfmotion.basics import (
 # Highest degree of polynomials: more resolves nothing, and takes minutes.
 _HIGHEST = 100
 # Largest number of intervals of splines, for the same reason.
-_MOST_INTERVALS = 2000
+_MAX_INTERVALS = 2000
 
 
 # Share of the duration in which a null motion found by a search fades to 0 at the ends.
@@ -154,7 +154,7 @@ class BSplineNullMotion(NullMotion):
     def __post_init__(self) -> None:
         _check_degree(self.degree)
         _check_space(self.space)
-        as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
+        as_whole(self.intervals, "null motion: intervals", 1, _MAX_INTERVALS)
 
     @property
     @override

@@ -30,7 +30,7 @@ _RATES = tuple(_MANY)
 # A last sample as near as this to the end counts as the end [s].
 _MOMENT = 0.5e-9
 # Largest number of samples: more do not fit into memory, and no controller takes them.
-MOST_SAMPLES = 1e7
+MAX_SAMPLES = 1e7
 
 
 def column_names(joint_names: Sequence[str]) -> list[str]:
@@ -334,10 +334,10 @@ class Trajectory:
             The rate is not positive, or gives too many samples.
         """
         rate = as_number(rate, "rate", above=0.0, error=ValueError)
-        if self.duration * rate > MOST_SAMPLES:
+        if self.duration * rate > MAX_SAMPLES:
             raise ValueError(
                 f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
-                f"all; expected at most {MOST_SAMPLES:g}"
+                f"all; expected at most {MAX_SAMPLES:g}"
             )
         count = int(np.floor(self.duration * rate * (1.0 + 1e-12)))
         t = np.arange(count + 1) / rate

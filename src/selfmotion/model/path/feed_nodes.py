@@ -15,7 +15,7 @@ from selfmotion.model.path.pace import Pace, largest_pace
 # Limiting causes of a tool that is slower than its feed.
 _CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
 # Smallest number of nodes between two knots of the original.
-_FEWEST = 16
+_MIN_NODES = 16
 # Approximate number of nodes: between them a feed is as accurate as splines.
 _ABOUT = 1000
 # Distance from a node at which accelerations are evaluated, relative to that of knots.
@@ -80,7 +80,7 @@ class FeedNodes:
         """The original's times at the nodes, (K,)."""
         parts = []
         for start, end in pairwise(self.path.knots):
-            count = max(_FEWEST, int(np.ceil(_ABOUT * (end - start) / self.path.duration)))
+            count = max(_MIN_NODES, int(np.ceil(_ABOUT * (end - start) / self.path.duration)))
             parts.append(np.linspace(start, end, count, endpoint=False))
         sigma = np.append(np.concatenate(parts), self.path.duration)
         for _ in range(_FINER):

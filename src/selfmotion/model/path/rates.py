@@ -11,7 +11,7 @@ _SAME = 1e-9
 # is resolved.
 _STEP = 2e-5
 # Smallest step, as a share of the duration: times are rounded.
-_LEAST_STEP = 1e-8
+_MIN_STEP = 1e-8
 # Steps that have to fit into an interval.
 _ROOM = 5.0
 # Offsets of a difference's samples from its middle, in steps.
@@ -64,7 +64,7 @@ def twist_rates(path: Path, t: Array) -> Array:
 def _rates_within(path: Path, edges: Array, interval: Ints, t: Array) -> Array:
     """Return the rates at times t (K,) as they are within pieces (K,), (K, 6)."""
     first, last = edges[interval], edges[interval + 1]
-    step = np.maximum(_STEP * (last - first), _LEAST_STEP * path.duration)
+    step = np.maximum(_STEP * (last - first), _MIN_STEP * path.duration)
     step = np.minimum(step, (last - first) / _ROOM)
     # Half a step off the edges: an edge belongs to one interval only.
     middle = np.clip(t, first + 2.5 * step, last - 2.5 * step)

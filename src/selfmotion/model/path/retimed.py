@@ -164,7 +164,7 @@ _CLOSE = 1e-9
 _HALVED = 14
 # Smallest of these intervals [s]: jerks between knots h apart have a rounding error of 1e-14 rad /
 # h³.
-_LEAST_LEFT = 1e-4
+_MIN_LEFT = 1e-4
 # Knots nearer than this, as a share of the remaining time, are merged.
 _ENOUGH = 1e-3
 
@@ -214,7 +214,7 @@ class Section(_Derived, kind="section"):
 
     def _crowded(self, knots: Array) -> Array:
         left = self.duration * 0.5 ** np.arange(1.0, _HALVED + 1.0)
-        left = left[left >= _LEAST_LEFT]
+        left = left[left >= _MIN_LEFT]
         gaps = np.abs(self.duration - left[:, None] - knots[:-1]).min(axis=1)
         inner = knots[(knots > 0.0) & (knots < (1.0 - _ENOUGH) * self.duration)]
         graded = self.duration - left[gaps > _ENOUGH * left]

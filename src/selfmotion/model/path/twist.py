@@ -34,7 +34,7 @@ _JUMP = 1e-9
 # Largest step of the orientation's integration, as a share of a segment.
 _STEP = 0.25
 # A path that turns farther than this [rad] is an error.
-_MOST_TURNED = 300.0
+_MAX_TURNED = 300.0
 
 
 class TwistPath(Path, kind="twist"):
@@ -92,10 +92,10 @@ class TwistPath(Path, kind="twist"):
         # |T_k| ≤ 1. A number that cannot be meant would be integrated for ever.
         rates = np.abs(self._coefficients[:, :, 3:]).sum(axis=(1, 2))
         angle = float(np.diff(self._breaks) @ rates)
-        if not angle <= _MOST_TURNED:
+        if not angle <= _MAX_TURNED:
             raise PathError(
                 f"twist path: turns by up to {angle:.3g} rad on its way, expected at most "
-                f"{_MOST_TURNED:g}; join shorter ones"
+                f"{_MAX_TURNED:g}; join shorter ones"
             )
 
     @property

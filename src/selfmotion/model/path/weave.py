@@ -28,7 +28,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 # Distance from a node at which changes of the speed are evaluated, relative to that of nodes.
 _BESIDE = 1e-4
 # Largest number of swings: an hour of a fast weld has some 6,000.
-_MOST_SWINGS = 20_000
+_MAX_SWINGS = 20_000
 # A swing as wide as this [m] is an error of units.
 _WIDEST = 0.5
 # Polynomial from 0 to 1 with slopes and curvatures 0 at both ends: 10x³ - 15x⁴ + 6x⁵.
@@ -95,10 +95,10 @@ class Weave(_InStep, kind="weave"):
                 f"weave: the path is {length:.6g} m long, expected two swings of {self._pitch:g} m "
                 f"at least; lengths are in metres"
             )
-        if length > _MOST_SWINGS * self._pitch:
+        if length > _MAX_SWINGS * self._pitch:
             raise PathError(
                 f"weave: a pitch of {self._pitch:g} m makes {length / self._pitch:.3g} swings, "
-                f"expected {_MOST_SWINGS:,} at most; lengths are in metres"
+                f"expected {_MAX_SWINGS:,} at most; lengths are in metres"
             )
 
     @override

@@ -59,7 +59,7 @@ def _checked(robot: RobotModel, q: npt.ArrayLike, several: bool) -> Array:
 
 # Largest weight of a metre [rad/m]: a slower prismatic joint hardly moves already, and weights of
 # hundreds make optima badly conditioned.
-_MOST = 10.0
+_MAX_METRE_WEIGHT = 10.0
 
 
 def joint_weights(robot: RobotModel) -> Array:
@@ -74,7 +74,7 @@ def speed_weights(robot: RobotModel) -> Array:
     if not (turns & known).any():
         return joint_weights(robot)
     fastest = float(limits[turns & known].mean())
-    by_speed = np.minimum(fastest / np.where(known, limits, 1.0), _MOST)
+    by_speed = np.minimum(fastest / np.where(known, limits, 1.0), _MAX_METRE_WEIGHT)
     return np.where(turns, 1.0, np.where(known, by_speed, joint_weights(robot)))
 
 

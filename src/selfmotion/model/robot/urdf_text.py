@@ -27,7 +27,7 @@ _BELOW = 3
 # … below this number of folders above a file …
 _ABOVE = 6
 # … up to this number of folders in all: a home is larger than any workspace.
-_MOST = 5000
+_MAX_FOLDERS = 5000
 _SKIPPED = {"node_modules", "__pycache__", "build", "log"}
 
 
@@ -209,7 +209,7 @@ def _walk(tops: Sequence[Path]) -> Iterator[Path]:
         for depth in range(_BELOW + 1):
             below: list[Path] = []
             for folder in level:
-                if folder in seen or len(seen) > _MOST:
+                if folder in seen or len(seen) > _MAX_FOLDERS:
                     continue
                 seen.add(folder)
                 yield folder

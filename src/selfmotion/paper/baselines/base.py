@@ -175,9 +175,9 @@ def _guarded(problem: Problem, rate: Rate) -> Rate:
 
 
 # Samples of a motion at the start …
-_FEWEST_STEPS = 64
+_MIN_STEPS = 64
 # … and doublings until the quintics between them are within the tolerance.
-_MOST_DOUBLINGS = 6
+_MAX_DOUBLINGS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,14 +312,14 @@ def _sampled(
     problem: Problem, motion: Motion, tolerance: Tolerance
 ) -> tuple[Trajectory, Certificate]:
     """Return the motion as quintics, with as many samples as the tolerance needs."""
-    grid = Grid.aligned(problem.path.knots, _FEWEST_STEPS)
+    grid = Grid.aligned(problem.path.knots, _MIN_STEPS)
     before = np.inf
-    for attempt in range(_MOST_DOUBLINGS + 1):
+    for attempt in range(_MAX_DOUBLINGS + 1):
         trajectory = _smooth(problem, motion, grid)
         certificate = problem.certify(trajectory, tolerance)
         errors = certificate.position_error.value, certificate.rotation_error.value
         # An error that halving does not change is the motion's own, not that of its samples.
-        if certificate.on_path or attempt == _MOST_DOUBLINGS or sum(errors) > 0.5 * before:
+        if certificate.on_path or attempt == _MAX_DOUBLINGS or sum(errors) > 0.5 * before:
             break
         before = sum(errors)
         grid = grid.halved()

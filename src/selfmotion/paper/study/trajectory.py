@@ -11,7 +11,7 @@ from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity,
 _LINKS = np.array([2.0, 2.0, 1.0])
 
 # Without a velocity term the search need not end: the table has the result after these iterations.
-_MOST_ITERATIONS = 60
+_MAX_ITERATIONS = 60
 
 _COLUMNS = (
     "variant",
@@ -110,7 +110,7 @@ def _table(context: Context) -> Table:
     rows: list[tuple[str | float | int, ...]] = []
     for name, costs, duration in _variants():
         problem = context.with_costs(costs, duration)
-        _, found = optimum(problem, tolerance=1e-10, max_iterations=_MOST_ITERATIONS)
+        _, found = optimum(problem, tolerance=1e-10, max_iterations=_MAX_ITERATIONS)
         work = (len(found.history) - 1, found.history[-1].evaluations)
         rows.append((name, *_row(context, costs, duration, found.x), *work))
     for mu in context.scale.published_mu:
@@ -121,7 +121,7 @@ def _table(context: Context) -> Table:
     note = (
         "The paper's twelve coefficients from x = 0; exact gradients except where it says "
         "'as published'. T = 2 goes there and back. F on a grid of 256 steps. Evaluations as "
-        f"published include those of differences. At most {_MOST_ITERATIONS} iterations."
+        f"published include those of differences. At most {_MAX_ITERATIONS} iterations."
     )
     return Table("Variants of the sample trajectory", _COLUMNS, tuple(rows), note)
 

@@ -23,11 +23,11 @@ from selfmotion.problem.constraints import (
 from selfmotion.problem.costs import Samples
 
 # Target share of a band that is left unused; half of it is guaranteed.
-_MARGIN = 5e-4
+_MARGIN_SHARE = 5e-4
 # At least [m or rad]: about the resolution of a certificate.
-_LEAST = 6e-7
+_MIN_MARGIN = 6e-7
 # Largest such share.
-_MOST = 0.5
+_MAX_MARGIN_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ class RowWithinBand(BoundLimits):
 
 def _margin(item: Relaxation) -> float:
     """Return the share of a band that is aimed to be left unused."""
-    return min(max(_MARGIN, _LEAST / item.band), _MOST)
+    return min(max(_MARGIN_SHARE, _MIN_MARGIN / item.band), _MAX_MARGIN_SHARE)
 
 
 def widest_band(item: Relaxation, follows: Follows) -> Quantity:

@@ -23,7 +23,7 @@ _ACTIVE_ABOVE = -0.19
 # Share of the reserved tolerance that a violation between points may use after subdivision.
 _SUBDIVISION_TARGET = 0.5
 # Largest number of parts that an interval is divided into at once.
-_MOST_PARTS = 4
+_MAX_PARTS = 4
 
 
 class UnitTangents(NodeTangents):
@@ -183,8 +183,8 @@ class CollocationRows:
         used = item.granted
         need = np.sqrt(np.maximum(h - used, 0.0) / (_SUBDIVISION_TARGET * (item.tolerance - used)))
         # An interval with NaN, which compares false, is divided.
-        need = np.where(h > -np.inf, need, _MOST_PARTS)
-        return np.clip(np.ceil(need), 1, _MOST_PARTS).astype(np.int64)
+        need = np.where(h > -np.inf, need, _MAX_PARTS)
+        return np.clip(np.ceil(need), 1, _MAX_PARTS).astype(np.int64)
 
     def carried(self, before: "CollocationRows", multipliers: Array) -> Array:
         """Return multipliers for these rows from those of the nearest points of the grid before."""

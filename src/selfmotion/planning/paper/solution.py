@@ -32,7 +32,7 @@ from selfmotion.planning.optimise import (
 )
 from selfmotion.planning.paper.ends import Eliminated, closed, from_unknowns, to_unknowns
 from selfmotion.planning.paper.objective import Objective, parts_of, require_finite_at, unmet
-from selfmotion.planning.rollout import MOST_HALVINGS, MinimumNormMotion
+from selfmotion.planning.rollout import MAX_HALVINGS, MinimumNormMotion
 from selfmotion.problem.constraints import BoundConstraint
 
 # Relative change of the cost between two grids at which it has converged.
@@ -277,7 +277,7 @@ class PublishedMotion:
     def _on_finer_grids(self) -> Self:
         """Return the optimum on the first halved grid on which its cost has converged."""
         motion, growths = self, 0
-        most = self.method.minimum_norm.grid.steps * 2**MOST_HALVINGS
+        most = self.method.minimum_norm.grid.steps * 2**MAX_HALVINGS
         try:
             while motion.steps < most and not motion._is_final:
                 finer = motion.refined()

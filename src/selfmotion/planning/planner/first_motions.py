@@ -29,7 +29,7 @@ _SIDEWAYS = (0.4, -0.4, 0.8, -0.8)
 # … after this share of the duration …
 _SIDEWAYS_AFTER = 1.0 / 4.0
 # … of which this number is tried at most.
-_MOST_SIDEWAYS = 4
+_MAX_SIDEWAYS = 4
 
 
 def smoothest(begun: NodeMotion, recorder: Recorder) -> Iterator[NodeMotion]:
@@ -95,4 +95,4 @@ def sideways(begun: NodeMotion) -> Iterator[NodeMotion]:
     goals = [start + far * way for way in begun.charts.bases[0].T for far in _SIDEWAYS]
     found = [grid.motion_towards(start, goal, time) for goal in goals]
     rank = partial(rank_of, begun=begun)
-    yield from sorted((motion for motion in found if motion), key=rank)[:_MOST_SIDEWAYS]
+    yield from sorted((motion for motion in found if motion), key=rank)[:_MAX_SIDEWAYS]

@@ -20,7 +20,7 @@ _STARTING = 0.01
 # … and at this multiple.
 _FARTHER = 3.0
 # Largest number of nodes for each smooth segment of the path.
-_MOST_NODES = 1024
+_MAX_NODES = 1024
 # Steps of the rough motions.
 _ROUGH_STEPS = 12
 # Relative difference of costs that count as equal.
@@ -40,7 +40,7 @@ def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:
 
 def most_nodes(formulation: Formulation) -> int:
     """Return the largest number of nodes of a path, by its length."""
-    return int(_MOST_NODES * (len(formulation.knots) + formulation.length_in_reaches))
+    return int(_MAX_NODES * (len(formulation.knots) + formulation.length_in_reaches))
 
 
 def first_nodes(formulation: Formulation) -> Array:

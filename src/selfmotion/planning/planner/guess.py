@@ -14,7 +14,7 @@ from selfmotion.planning.planner.grids import first_nodes, most_nodes
 from selfmotion.planning.planner.outcomes import MinimumNormOutcome
 from selfmotion.planning.result import Plan
 from selfmotion.planning.rollout import (
-    MOST_HALVINGS,
+    MAX_HALVINGS,
     Guide,
     MinimumNormMotion,
     converged_minimum_norm,
@@ -159,7 +159,7 @@ class Guess:
     @property
     def most_steps(self) -> int:
         """Number of steps above which a grid is not refined any more."""
-        return int(self.minimum_norm.motion.grid.steps * 2**MOST_HALVINGS)
+        return int(self.minimum_norm.motion.grid.steps * 2**MAX_HALVINGS)
 
     def near(self, motion: Trajectory) -> "Guess":
         """Return it with a motion that is known, in place of the minimum-norm one."""

@@ -13,7 +13,7 @@ from selfmotion.planning.planner.largest_part import Part
 from selfmotion.planning.planner.refinement import refined
 from selfmotion.planning.planner.solution import Solution, have_one_start
 from selfmotion.planning.planner.solve import kept_off_itself, settle, solve
-from selfmotion.planning.rollout import MOST_HALVINGS
+from selfmotion.planning.rollout import MAX_HALVINGS
 
 # Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
 _RESOLVED = 0.3
@@ -83,7 +83,7 @@ class _ByCertificate:
         self, formulation: Formulation, part: Part, tolerance: Tolerance, progress: Progress
     ) -> None:
         self._formulation, self._tolerance, self._progress = formulation, tolerance, progress
-        self._first, self._rounds, self._roughs = part.solution.outcome.steps, MOST_HALVINGS, 0
+        self._first, self._rounds, self._roughs = part.solution.outcome.steps, MAX_HALVINGS, 0
         self._coarse: Trajectory | None = None
         self._misses: list[float] = []
         self.part = part
@@ -151,7 +151,7 @@ class _ByPath:
     motion: Evaluation
 
     def __init__(self, formulation: Formulation, tolerance: Tolerance) -> None:
-        self._formulation, self._rounds, self._worst = formulation, MOST_HALVINGS, np.inf
+        self._formulation, self._rounds, self._worst = formulation, MAX_HALVINGS, np.inf
         self._allowed = np.array([tolerance.position, tolerance.rotation])
 
     def __call__(self, solution: Solution) -> Solution | None:

@@ -25,7 +25,7 @@ _EDGE_MARGIN = 1e-4
 # Relative accuracy of the end of the part.
 _END_AGREEMENT = 4e-3
 # Smallest part, as a share of the path, and of its first segment.
-_LEAST_PART = 1e-2
+_MIN_PART = 1e-2
 # Largest number of ends that are tried.
 _PROBES = 10
 # Steps in which motions are followed …
@@ -150,7 +150,7 @@ def _largest_part(formulation: Formulation, reach: Reach, effort: Effort) -> Par
 def _least(formulation: Formulation) -> float:
     """Return the smallest duration of a part of a path [s]."""
     first = float(edges_of(formulation.path.knots)[1])
-    return _LEAST_PART * min(first, formulation.path.duration)
+    return _MIN_PART * min(first, formulation.path.duration)
 
 
 def _bisect(

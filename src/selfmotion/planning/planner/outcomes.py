@@ -45,9 +45,9 @@ ENDS_MET = 1e-8
 # Statuses of an optimum.
 ARRIVED = (Status.CONVERGED, Status.PRECISION)
 # Relative saving below which a constraint does not bind.
-_LEAST_SAVING = 1e-6
+_MIN_SAVING = 1e-6
 # Largest relative saving in reports: multipliers are first derivatives, which are valid nearby.
-_MOST_SAVING = 1e-2
+_MAX_SAVING = 1e-2
 
 
 class OutcomeFacts(NamedTuple):
@@ -370,7 +370,7 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     for item in grid.conditions.ends:
         own = ends[id(item)][None]
         each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
-    least, most = (share * abs(motion.cost) for share in (_LEAST_SAVING, _MOST_SAVING))
+    least, most = (share * abs(motion.cost) for share in (_MIN_SAVING, _MAX_SAVING))
     return active_of(each, grid.t[[0, -1]], least, most)
 
 

@@ -72,7 +72,7 @@ _DEARER = 1.25
 # The same if that is a chain itself, which optimisation hardly improves.
 _DEARER_CHAIN = 1.005
 # Share of a joint at rest in the correction of a velocity, relative to the fastest joint's.
-_LEAST = 1e-2
+_MIN_SPEED_SHARE = 1e-2
 # Speed below which all joints rest [rad/s or m/s].
 _REST = 1e-9
 # Samples between two nodes for limits.
@@ -392,7 +392,7 @@ def _resting(motion: NodeMotion, near: Array) -> Array:
     share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _REST)
     rows = motion.grid.formulation.follows.jacobians(motion.place.q)
     lack = np.einsum("kmn,kn->km", rows, motion.place.qd - near)
-    shared = np.maximum(share, _LEAST)[:, :, None] * rows.transpose(0, 2, 1)
+    shared = np.maximum(share, _MIN_SPEED_SHARE)[:, :, None] * rows.transpose(0, 2, 1)
     return np.asarray(near + (shared @ np.linalg.solve(rows @ shared, lack[:, :, None]))[:, :, 0])
 
 

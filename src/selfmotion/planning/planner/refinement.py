@@ -28,7 +28,7 @@ _WANTED_NEAR_PATH = 1e-7
 # … by this power of the ratio, since the error falls with the third power or more …
 _FINER_POWER = 0.3
 # … into this number of parts at most.
-_MOST_PARTS = 8.0
+_MAX_PARTS = 8.0
 # Refinement rounds.
 _NODE_ROUNDS = 14
 # Extra clearance [m] at collocation points when the motion between them collides; tried in turn.
@@ -152,7 +152,7 @@ def _finer(search: LocalSearch, known: NodeOutcome) -> Array | None:
     # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
     wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
     parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
-    parts = np.clip(parts, 1.0, _MOST_PARTS).astype(int)
+    parts = np.clip(parts, 1.0, _MAX_PARTS).astype(int)
     away = conservatism(grid.rows, known.multipliers, motion.curve_ends)
     least = NOTHING * abs(motion.objective)
     if away.sum() > least:

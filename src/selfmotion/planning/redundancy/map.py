@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 # Pixels along the path and up: a second of the shell's patience, and three degrees of a turn.
 PIXELS = (121, 121)
 # Largest number of pixels to a side: a hundred times as many take minutes.
-_MOST_PIXELS = 2000
+_MAX_PIXELS = 2000
 # Configurations that are judged at once.
 _AT_ONCE = 1000
 # Samples of a plan's line between two pixels: angles between them turn by much less than π.
@@ -298,7 +298,7 @@ def _judged(
 def _shape(shape: tuple[int, int]) -> tuple[int, int]:
     if not (isinstance(shape, tuple | list) and len(shape) == 2):
         raise ProblemError(f"shape is {shape!r}, expected two numbers of pixels")
-    first, second = (as_whole(number, "shape", 2, _MOST_PIXELS) for number in shape)
+    first, second = (as_whole(number, "shape", 2, _MAX_PIXELS) for number in shape)
     return first, second
 
 

@@ -28,7 +28,7 @@ FULLY = 0.95
 # Evaluations of limits per sample of the motion.
 _LIMIT_OVERSAMPLING = 3
 # Smallest number of these evaluations.
-_FEWEST_EVALUATIONS = 2000
+_MIN_EVALUATIONS = 2000
 _RATES = ("speed", "acceleration", "jerk")
 
 
@@ -68,7 +68,7 @@ def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
     envelope = envelope_of_problem(problem)
     quantities = quantities_of_pace(problem.requirements)
     limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
-    count = max(_LIMIT_OVERSAMPLING * len(motion.t), _FEWEST_EVALUATIONS)
+    count = max(_LIMIT_OVERSAMPLING * len(motion.t), _MIN_EVALUATIONS)
     # Midpoint rule on equal intervals.
     t = motion.t[0] + motion.duration * (np.arange(count) + 0.5) / count
     used = np.concatenate(limits.shares_at(motion, t), axis=1)

@@ -97,7 +97,7 @@ def _basis(h: Array, before: Array, after: Array, share: Array | float) -> Array
 # that all joints have together.
 
 # Smallest square of a rate, as a share of its earlier value.
-LEAST = 1e-6
+MIN_SQUARED_RATE = 1e-6
 # Places in an interval at which limits are evaluated: from just inside its start to its end.
 PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
 # Smaller values count as 0.
@@ -284,7 +284,7 @@ def rows_of(
         table.add(bent, -room[1][:, some], room[1][:, some])
         some = np.isfinite(limits.jerk)
         if some.any():
-            b = np.maximum(near.inside(share), LEAST)[:, None]
+            b = np.maximum(near.inside(share), MIN_SQUARED_RATE)[:, None]
             surge = (third * value + 1.5 * second * slope + 0.5 * first * bend)[:, :, some]
             surge *= np.sqrt(b) / (limits.jerk[some] * room[2][:, some])
             for sign in (1.0, -1.0):
@@ -346,7 +346,7 @@ def _parts(
     df = (½ f_q̇ q_τ / √b + f_q̈ q_ττ) db + ½ f_q̈ q_τ db'
     """
     b, change = b[:, None], change[:, None]
-    root = np.sqrt(np.maximum(b, LEAST))
+    root = np.sqrt(np.maximum(b, MIN_SQUARED_RATE))
     state = q, root * first, second * b + 0.5 * first * change
     found, (_, *by) = item.away(*state), item.derivatives(*state)
     by_value = by_slope = np.zeros_like(found)

@@ -9,7 +9,7 @@ from selfmotion.model.motion import Trajectory, slowdown_of
 from selfmotion.model.path import Pace, times_when
 from selfmotion.planning.optimise import banded_optimum
 from selfmotion.planning.result.pace_rows import (
-    LEAST,
+    MIN_SQUARED_RATE,
     PaceLimits,
     Squares,
     States,
@@ -18,7 +18,7 @@ from selfmotion.planning.result.pace_rows import (
 )
 
 # Smallest number of knots of a pace of constant joint speed …
-_FEWEST = 600
+_MIN_KNOTS = 600
 # … and about the largest.
 _ENOUGH = 3000
 # Parts of its first and last intervals.
@@ -49,8 +49,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 def of_constant_speed(motion: Trajectory) -> Pace:
     """Return the pace at which the joints together are always about as fast."""
     knots = motion.t
-    if len(knots) - 1 < _FEWEST:
-        parts = -(-_FEWEST // (len(knots) - 1))
+    if len(knots) - 1 < _MIN_KNOTS:
+        parts = -(-_MIN_KNOTS // (len(knots) - 1))
         places = np.arange(parts * (len(knots) - 1) + 1) / parts
         knots = np.interp(places, np.arange(len(knots)), knots)
     elif len(knots) > 2 * _ENOUGH:
@@ -163,7 +163,7 @@ _FIRST = (50.0, 50.0, 9.0)
 # … and in others.
 _OTHERS = 9.0
 # Largest b: little else bounds it at rest.
-_MOST = 500.0
+_MAX_SQUARED_RATE = 500.0
 # With limits of the jerk, linearisations are valid nearby: restarts at the pace before …
 _BASES = 3
 # … each with this largest change of b …
@@ -171,7 +171,7 @@ _BY_JERKS = 4.0
 # … and this one in later steps.
 _BY_JERKS_LATER = 2.0
 # Largest number of steps from there …
-_MOST_STEPS = 12
+_MAX_STEPS = 12
 # … of which the first ones add knots …
 _ADDING = 7
 # … until the relative gain is below this.
@@ -183,7 +183,7 @@ _KEPT = 0.9998
 # … and one that is near enough.
 _NEAR = 1.0003
 # Smallest factor of the room between two knots in one step.
-_LEAST_ROOM = 0.8
+_MIN_ROOM = 0.8
 # Excess of a limit for which a knot is added …
 _ROUGH = 1.002
 # … unless knots are nearer than this [s] …
@@ -266,7 +266,7 @@ def _converged(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -
     near = Squares.constant(_knots(base, motion, limits), 1.0)
     room = _all_room(len(near.knots) - 1, limits)
     most, count, unsolved = _BY_JERKS_LATER if limits.has_jerk else _OTHERS, len(near.knots), 0
-    for number in range(_MOST_STEPS):
+    for number in range(_MAX_STEPS):
         known = near
         near, reached = _improved(base, motion, limits, room, known, ends, most, _GAP)
         unsolved = 0 if reached else unsolved + 1
@@ -334,7 +334,7 @@ def _knots(base: Pace, motion: Trajectory, limits: PaceLimits) -> Array:
 
 
 def _less(used: Array, cut: Flags) -> Array:
-    less = np.maximum(_AIM / np.maximum(used, _AIM), _LEAST_ROOM)
+    less = np.maximum(_AIM / np.maximum(used, _AIM), _MIN_ROOM)
     return np.where(cut[:, None] | (used <= _KEPT), 1.0, less)
 
 
@@ -390,11 +390,11 @@ def _improved(
     widths = np.diff(np.concatenate([[knots[0]] * 2, knots, [knots[-1]] * 2]))
     weights = np.convolve(widths, np.ones(3), mode="full")[2:-2] / 3.0
     gradient = weights * np.maximum(near.c, 1e-4) ** -1.5
-    upper = np.minimum(most * near.c, _MOST) + 2.0 * LEAST
+    upper = np.minimum(most * near.c, _MAX_SQUARED_RATE) + 2.0 * MIN_SQUARED_RATE
     upper = np.where(fixed, start, upper)
     # If a pace may not be much slower either, the remaining room has none.
     for lower in ([near.c / most] if limits.has_jerk else []) + [0.0 * near.c]:
-        least = np.where(fixed, start, np.maximum(lower, LEAST))
+        least = np.where(fixed, start, np.maximum(lower, MIN_SQUARED_RATE))
         found, reached = banded_optimum(gradient, rows, start, least, upper, gap)
         if reached:
             break

@@ -22,7 +22,7 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.model.motion import MOST_SAMPLES, Grid, Trajectory, slowdown_of
+from selfmotion.model.motion import MAX_SAMPLES, Grid, Trajectory, slowdown_of
 from selfmotion.model.path import REST_SPEED, Pace, Path, Retimed, edges_of
 from selfmotion.planning.result.measured import quantities_of_pace
 from selfmotion.planning.result.pace_rows import PaceLimits
@@ -159,10 +159,10 @@ def at_rate(plan: Plan, rate: float) -> Plan:
     """
     duration = plan.trajectory.duration
     rate = as_number(rate, "rate", above=0.0)
-    if not 1.0 <= rate * duration <= MOST_SAMPLES:
+    if not 1.0 <= rate * duration <= MAX_SAMPLES:
         raise ProblemError(
             f"rate is {rate:g} Hz, expected from {1.0 / duration:.4g} to "
-            f"{MOST_SAMPLES / duration:.4g}, so that the motion of {duration:.6g} s has samples, "
+            f"{MAX_SAMPLES / duration:.4g}, so that the motion of {duration:.6g} s has samples, "
             f"not too many"
         )
     envelope = envelope_of_problem(plan.problem)

@@ -12,7 +12,7 @@ from selfmotion.basics import Array, read_only
 from selfmotion.model.motion import Trajectory
 
 # Smallest backward motion of a joint that counts as a reversal [rad or m].
-LEAST = 1e-3
+MIN_REVERSAL = 1e-3
 # Evaluations of joint speeds per sample of the motion.
 _REVERSAL_OVERSAMPLING = 4
 # Bisections of the time of a reversal.
@@ -66,12 +66,12 @@ def _reversal_times(motion: Trajectory, joint: int, t: Array, speed: Array) -> A
         before = motion(middle, 1)[:, joint] * sign > 0.0 if len(middle) else sign > 0.0
         early, late = np.where(before, middle, early), np.where(before, late, middle)
     places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, joint]
-    # Pairs of reversals nearer than LEAST are dropped, the nearest pair first: jitter is none.
+    # Pairs of reversals nearer than MIN_REVERSAL are jitter: they go, the nearest pair first.
     selected = list(range(len(places)))
     while len(selected) > 2:
         lengths = np.abs(np.diff(places[selected]))
         least = int(np.argmin(lengths))
-        if lengths[least] > LEAST:
+        if lengths[least] > MIN_REVERSAL:
             break
         if least == 0:
             del selected[1]

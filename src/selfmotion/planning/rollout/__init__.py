@@ -1,7 +1,7 @@
 """Eq. 4 integrated from a start: motions of a null motion, and the minimum-norm motion."""
 
 from selfmotion.planning.rollout.minimum_norm import (
-    MOST_HALVINGS as MOST_HALVINGS,
+    MAX_HALVINGS as MAX_HALVINGS,
     Guide as Guide,
     MinimumNormMotion as MinimumNormMotion,
     brought_to_rest as brought_to_rest,

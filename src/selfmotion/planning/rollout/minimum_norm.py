@@ -14,7 +14,7 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.rollout.rollout import Rollout
 
 # Steps of the first grid, which is halved until …
-_FEWEST_STEPS = 32
+_MIN_STEPS = 32
 # … the minimum-norm motion drifts off the path by less than this, relative to the path's extent.
 # Costs then have about the same accuracy.
 _DRIFT = 1e-3
@@ -25,7 +25,7 @@ _SAME_AMOUNT = 0.5
 # Joint motion of a breakdown near a singular pose [rad or m].
 _WILD = 1e3
 # Largest number of halvings of the first grid.
-MOST_HALVINGS = 8
+MAX_HALVINGS = 8
 # Shorter paths [m] count as a point.
 _SHORTEST = 1e-3
 
@@ -184,12 +184,12 @@ def converged_minimum_norm(
     BreakdownError
         It runs into a singular pose.
     """
-    steps = max(_FEWEST_STEPS, formulation.problem.null_motion.fewest_steps)
+    steps = max(_MIN_STEPS, formulation.problem.null_motion.fewest_steps)
     grid = grid or Grid.aligned(formulation.knots, steps)
     coarse: Array | None = None
     troubles: list[tuple[float, float]] = []
     evaluations = 0
-    for _ in range(MOST_HALVINGS):
+    for _ in range(MAX_HALVINGS):
         minimum_norm = MinimumNormMotion.on(formulation, configuration, grid, guide)
         evaluations += minimum_norm.jacobian_evaluations
         converged = _converged_grid(minimum_norm, coarse)

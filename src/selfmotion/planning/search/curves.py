@@ -31,7 +31,7 @@ _ALIGNED = 0.93
 # A configuration this near [rad or m] to a curve's polyline is on the curve.
 ON_CURVE = 0.02
 # Largest number of samples of a curve.
-_MOST_SAMPLES = 5000
+_MAX_SAMPLES = 5000
 # One in this many samples of a curve is a seed at the next waypoint.
 _CARRIED = 6
 
@@ -389,7 +389,7 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        samples, on = np.empty((_MOST_SAMPLES, self.coordinates.dof)), self._manifold
+        samples, on = np.empty((_MAX_SAMPLES, self.coordinates.dof)), self._manifold
         count, closed = walk(
             start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )

@@ -28,11 +28,11 @@ _STRIDE = 0.02
 _TURN = 0.1
 # Smallest number of times with self-motion curves, which resolve more than samples of larger
 # spaces.
-_FEWEST_OF_CURVES = 150
+_MIN_TIMES_ON_CURVES = 150
 # The same without: fewer would miss obstacles.
-_FEWEST = 60
+_MIN_TIMES = 60
 # Largest number of times.
-_MOST = 400
+_MAX_TIMES = 400
 # Samples of the path for the length of the tool's motion.
 _PATH_SAMPLES = 2000
 # Clearance of sequences in addition to the required one [m]: they are checked at waypoints only.
@@ -135,7 +135,9 @@ def has_curves(formulation: Formulation) -> bool:
 
 def waypoint_times(formulation: Formulation) -> Array:
     """Return times (W,) [s] at which to search for a problem's configurations."""
-    return search_times(formulation.path, _FEWEST_OF_CURVES if has_curves(formulation) else _FEWEST)
+    return search_times(
+        formulation.path, _MIN_TIMES_ON_CURVES if has_curves(formulation) else _MIN_TIMES
+    )
 
 
 def search_times(path: Path, fewest: int) -> Array:
@@ -146,7 +148,7 @@ def search_times(path: Path, fewest: int) -> Array:
     turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])
     travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
     # Time counts as well, so that times increase where the tool rests.
-    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
+    count = int(np.clip(np.ceil(travel[-1]), fewest, _MAX_TIMES))
     travel += t * (1e-3 * count / path.duration)
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
     times[-1] = path.duration

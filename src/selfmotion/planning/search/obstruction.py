@@ -14,7 +14,7 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.search_bounds import AT_LIMIT
 from selfmotion.planning.search.single_poses import (
     CLIMBERS,
-    MOST_EVALUATED,
+    MAX_EVALUATED,
     Found,
     SinglePoses,
     first_blocked,
@@ -252,7 +252,7 @@ def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
     """Return the nearest bodies at the smallest overlap of all, and the required distance."""
     # The last ones were moved away from obstacles.
     _, worst, required = max(
-        (room_of(poses, q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0]
+        (room_of(poses, q) for q in met[-MAX_EVALUATED:]), key=lambda each: each[0]
     )
     return worst, required
 

@@ -18,7 +18,7 @@ from selfmotion.model.robot import null_space
 from selfmotion.planning.search.search_bounds import SearchBounds
 
 # Configurations that are moved: those that meet least …
-_MOST = 24
+_MAX_PUSHED = 24
 # … of so many that are judged.
 _JUDGED = 200
 # Steps of each.
@@ -78,7 +78,7 @@ class Pushing:
             (model.clearances(some[:, : model.robot.dof]).values - far).min(axis=1, initial=np.inf)
             for model, far in self._models
         ]
-        return np.asarray(some[np.argsort(-np.min(rooms, axis=0), kind="stable")[:_MOST]])
+        return np.asarray(some[np.argsort(-np.min(rooms, axis=0), kind="stable")[:_MAX_PUSHED]])
 
     def _lacks(self, q: Array) -> list[tuple[Array, Array]]:
         """Return of each model what is missing of distances (K, P) [m], and their slopes."""

@@ -24,7 +24,7 @@ _STEP_POINTS = 8
 # Largest share of a step between two of these for which an arm can follow …
 _JUMP_SHARE = 0.4
 # … or the largest distance [rad or m].
-_LEAST_JUMP = 0.05
+_MIN_JUMP = 0.05
 # Searches for chains, each without the jumps of the one before.
 _JUMP_ROUNDS = 12
 
@@ -113,7 +113,7 @@ def jumps_of(
     between = found.reshape(len(here), len(share), n)
     whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
     parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
-    most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
+    most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _MIN_JUMP)
     # Correct also for no steps at all.
     return np.asarray((parts > most) | ~arrived.reshape(len(here), len(share)).all(axis=1))
 

@@ -29,7 +29,7 @@ _APPROACHED = 48
 # … and before a pose is given up: near limits a third of them converges, of Newton's one in 300.
 _MORE_APPROACHED = 400
 # Configurations in collision that are evaluated.
-MOST_EVALUATED = 80
+MAX_EVALUATED = 80
 # Of these, the ones with the smallest overlap that are moved at random.
 CLIMBERS = 8
 # Random walks along the self-motions: number at a time …
@@ -267,7 +267,7 @@ def _wandered(poses: SinglePoses, t: float, met: Array) -> Array:
 
 def _climbed(poses: SinglePoses, t: float, met: Array) -> Array:
     """Return configurations that are less near to bodies than those that were found, (K, n)."""
-    some = met[:: -(-len(met) // MOST_EVALUATED)]
+    some = met[:: -(-len(met) // MAX_EVALUATED)]
     best = some[np.argsort([-room_of(poses, q)[0] for q in some])[:CLIMBERS]]
     room = np.array([room_of(poses, q)[0] for q in best])
     for size in _CLIMBS:

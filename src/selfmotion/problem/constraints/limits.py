@@ -20,7 +20,7 @@ _RATES = ("position", "velocity", "acceleration", "jerk")
 # Limits this many times the arm's own are in other units.
 _FAR_ABOVE = 10.0
 # The same of limits that no joint has, by order of derivative: unit and value.
-_MOST = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
+_IMPLAUSIBLE = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class _RateLimits(Constraint):
         """Limits far above the arm's own, or any arm's, by joint."""
         if self.limit is None:
             return ()
-        (unit, most), published = _MOST[self.order], self.published(robot)
+        (unit, most), published = _IMPLAUSIBLE[self.order], self.published(robot)
         given = per_joint(self.limit, robot.dof, f"{robot.name}: {LIMIT_NAMES[self.order]}")
         for k, name in enumerate(robot.joint_names):
             if robot.is_prismatic(name) or not np.isfinite(given[k]):

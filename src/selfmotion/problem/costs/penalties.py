@@ -15,7 +15,7 @@ from selfmotion.problem.costs.base import ERROR, Cost, Partials, check_name
 from selfmotion.problem.costs.samples import Samples
 
 # G at rest: it keeps the root differentiable.
-_LEAST = 1e-3
+_AT_REST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +89,8 @@ class LimitUse(Cost):
         speed, rate = samples.qd / v, samples.qdd / a
         used = np.concatenate([np.abs(speed), np.sqrt(np.abs(rate))], axis=1)
         # Of the largest, whose power is 1: others underflow without harm.
-        top = np.maximum(used.max(axis=1), _LEAST)[:, None]
-        total = np.sum((used / top) ** self.power, axis=1) + (_LEAST / top[:, 0]) ** self.power
+        top = np.maximum(used.max(axis=1), _AT_REST)[:, None]
+        total = np.sum((used / top) ** self.power, axis=1) + (_AT_REST / top[:, 0]) ** self.power
         return top[:, 0] * total ** (1.0 / self.power), speed, rate
 
 

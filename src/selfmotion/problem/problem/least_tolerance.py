@@ -20,7 +20,7 @@ _STARTS = 8
 # Position error that counts as 0 [m].
 _NEAR = 1e-6
 # Largest step [rad or m].
-_MOST = 0.1
+_MAX_STEP = 0.1
 # Relative singular value of directions that count.
 _RANK = 1e-3
 # Share of a step towards a smaller tilt.
@@ -96,7 +96,7 @@ def _largest_lean(follows: Follows, start: Array) -> float | None:
             step = onto + _DAMPED * np.linalg.pinv(turns, rcond=_RANK) @ (
                 lean - across @ jacobian[3:] @ onto
             )
-            step *= min(1.0, _MOST / max(float(np.abs(step).max()), 1e-300))
+            step *= min(1.0, _MAX_STEP / max(float(np.abs(step).max()), 1e-300))
             q = np.clip(q + step, robot.lower, robot.upper)
             if np.abs(step).max() < _LAST:
                 break

@@ -68,7 +68,7 @@ class Loop:
 
 
 # Smallest numbers of a loop [s].
-_LEAST = {"horizon": 0.1, "period": 1e-3, "cycle": 1e-4, "silence": 0.1, "seconds": 0.1}
+_MIN_TIMES = {"horizon": 0.1, "period": 1e-3, "cycle": 1e-4, "silence": 0.1, "seconds": 0.1}
 
 
 def loop_of(document: Mapping[str, Any], file: Path) -> Loop:
@@ -78,7 +78,7 @@ def loop_of(document: Mapping[str, Any], file: Path) -> Loop:
     # Others are told where the document is checked.
     given = {name: value for name, value in values.items() if name in known}
     for name, value in given.items():
-        least = _LEAST.get(name, 0.0)
+        least = _MIN_TIMES.get(name, 0.0)
         if isinstance(value, int | float) and not value >= least:
             raise sm.errors.FileFormatError(
                 f"{file}: loop.{name}: is {value}, expected at least {least:g} s"

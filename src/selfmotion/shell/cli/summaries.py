@@ -19,7 +19,7 @@ _VERBOSE_OPTION = "--verbose"
 # Text after which a message lists remedies.
 _REMEDIES = "what would help: "
 # Smallest saving that is printed, as a share of the cost: it rounds to 1 %.
-_LEAST_SAVING = 0.009
+_MIN_SAVING = 0.009
 # Statuses that need no line, unless the report's message says more.
 _ENDED_WELL = (Status.CONVERGED, Status.PRECISION)
 
@@ -64,7 +64,7 @@ def _largest_saving(report: Report) -> str:
         return ""
     first = report.active[0]
     share = first.saving / abs(report.cost)
-    if share < _LEAST_SAVING:
+    if share < _MIN_SAVING:
         return ""
     return (
         f"{first.easing} would lower the cost by about {100.0 * share:.2g} % (a slope: more of it "

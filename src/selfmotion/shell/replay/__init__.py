@@ -24,7 +24,7 @@ from selfmotion.shell.replay.page import (
     write_replay as write_replay,
 )
 from selfmotion.shell.replay.redundancy import (
-    MOST_SEAMS as MOST_SEAMS,
+    MAX_SEAMS as MAX_SEAMS,
     SLICES as SLICES,
     SeamMaps as SeamMaps,
     slices as slices,

@@ -33,7 +33,7 @@ FEWER_PIXELS: Pixels = (61, 61)
 # Largest number of slices of a page.
 SLICES = 3
 # Jobs with more seams have no maps.
-MOST_SEAMS = 24
+MAX_SEAMS = 24
 # Code of "no cause".
 _NO_CAUSE = 2**16 - 1
 

@@ -22,7 +22,7 @@ from selfmotion.shell.replay import scene, three
 from selfmotion.shell.replay.facts import Cell, cells
 from selfmotion.shell.replay.meshes import Json, Payload
 from selfmotion.shell.replay.motion import CURVE_POINTS, ClearanceCurve, Curves, SelfMotion
-from selfmotion.shell.replay.redundancy import FEWER_PIXELS, MOST_SEAMS, SeamMaps, slices
+from selfmotion.shell.replay.redundancy import FEWER_PIXELS, MAX_SEAMS, SeamMaps, slices
 from selfmotion.shell.replay.replayed import ToolTip, clearance_of
 from selfmotion.work.job import Program
 
@@ -141,7 +141,7 @@ class SequenceReplay:
 
     def maps(self) -> list[SeamMaps]:
         """See `Replayed.maps`; a job of many seams has none."""
-        if len(self.plans) > MOST_SEAMS:
+        if len(self.plans) > MAX_SEAMS:
             return []
         return [
             SeamMaps(begin, name, slices(plan, FEWER_PIXELS)) for begin, name, plan in self.plans

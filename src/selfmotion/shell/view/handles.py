@@ -15,7 +15,7 @@ from selfmotion.shell.view.document import Keys, at, is_job
 from selfmotion.shell.view.poses import read_pose, rounded, write_pose
 
 # Of more waypoints none is dragged: they would hide the path.
-_MOST_WAYPOINTS = 40
+_MAX_WAYPOINTS = 40
 # A pose as near as this to the one before is the same [m].
 _SAME = 1e-7
 # Tool motions that begin where the arm does, unless they say where.
@@ -159,7 +159,7 @@ def _of_seams(document: Mapping[str, Any], problem: Problem) -> Iterator[Handle]
         return
     for k, seam in enumerate(seams):
         path, name, keys = seam["path"], str(seam["name"]), ("seams", k, "path")
-        if is_free and len(seams) <= _MOST_WAYPOINTS:
+        if is_free and len(seams) <= _MAX_WAYPOINTS:
             is_shape = path.get("kind") in _SHAPES and "frame" not in path
             key = "start" if is_shape else "frame"
             if not is_shape or "start" in path:
@@ -190,7 +190,7 @@ def _of_waypoints(
         prefix = prefix * read_pose(path["frame"])
     key = "positions_mm" if "positions_mm" in path else "positions"
     points = np.array(path.get(key, []), dtype=np.float64) * (1e-3 if key != "positions" else 1.0)
-    if points.ndim != 2 or len(points) > _MOST_WAYPOINTS:
+    if points.ndim != 2 or len(points) > _MAX_WAYPOINTS:
         return
     for k, point in enumerate(points):
         pose, own = SE3(np.eye(3), point), (*keys, key, k)

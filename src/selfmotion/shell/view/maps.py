@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Progress
 from selfmotion.planning.redundancy import PIXELS
 from selfmotion.planning.result import Plan
-from selfmotion.shell.replay import MOST_SEAMS, SLICES, SeamMaps, slices
+from selfmotion.shell.replay import MAX_SEAMS, SLICES, SeamMaps, slices
 from selfmotion.shell.view.requests import Outcome
 
 # All maps of a page are made in about this time [s]; on machines that are busy it is more.
@@ -16,7 +16,7 @@ _SECONDS = 1.0
 # Pixels to a side of the two maps that tell how long others take, and of the coarsest one.
 _TRIED, _FEWEST = (5, 15), 15
 # No pixel takes less than this [s].
-_LEAST = 1e-6
+_MIN_PIXEL_SECONDS = 1e-6
 
 
 def maps_soon(outcome: Outcome, progress: Progress) -> Iterator[SeamMaps]:
@@ -25,7 +25,7 @@ def maps_soon(outcome: Outcome, progress: Progress) -> Iterator[SeamMaps]:
     Bodies that have to be far apart make each pixel take long: then there are fewer.
     """
     plans = [] if outcome.replayed is None else list(outcome.replayed.plans)
-    if len(plans) > MOST_SEAMS:
+    if len(plans) > MAX_SEAMS:
         return
     for begin, name, plan in plans:
         side = _side(plan, _SECONDS / len(plans), progress)
@@ -41,5 +41,5 @@ def _side(plan: Plan, seconds: float, progress: Progress) -> int:
         plan.redundancy_map(shape=(side, side), progress=progress)
         took.append(time.perf_counter() - began)
     few, more = _TRIED
-    each = max((took[1] - took[0]) / (more**2 - few**2), _LEAST)
+    each = max((took[1] - took[0]) / (more**2 - few**2), _MIN_PIXEL_SECONDS)
     return int(np.clip(np.sqrt(seconds / each), _FEWEST, PIXELS[0]))

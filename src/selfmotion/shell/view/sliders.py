@@ -22,7 +22,7 @@ _OF_TOLERANCE = {
     "rotation_deg": ("tolerance of rotation", "°"),
 }
 # Of more seams none has a slider of its own.
-_MOST_SEAMS = 12
+_MAX_SEAMS = 12
 _WEIGHTS = ("weight", "mu")
 
 
@@ -90,7 +90,7 @@ def _paced(document: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
     """Return the tables that say how fast a path is, and how their sliders are told apart."""
     seams = document.get("seams")
     if isinstance(seams, list):
-        if len(seams) <= _MOST_SEAMS:
+        if len(seams) <= _MAX_SEAMS:
             yield from (
                 (("seams", k, "path"), f" of {seams[k]['name']}") for k in range(len(seams))
             )

@@ -17,11 +17,11 @@ from selfmotion.basics import Array
 # Ratio of height to chord below which a circle is a line.
 _FLAT = 1e-6
 # Largest angle of a circular step [rad]: ABB's are below 240°.
-MOST_TURN = np.radians(200.0)
+MAX_TURN = np.radians(200.0)
 # Smallest angle of a circular step [rad]: ABB requires points that are 1° apart.
-LEAST_TURN = np.radians(3.0)
+MIN_TURN = np.radians(3.0)
 # Shortest circular step [m]: ABB requires points that are 0.1 mm apart.
-LEAST_LENGTH = 1e-3
+MIN_LENGTH = 1e-3
 
 
 class Arc(NamedTuple):
@@ -50,7 +50,7 @@ class Arc(NamedTuple):
     @property
     def is_meant(self) -> bool:
         """Whether controllers make a step of it."""
-        return LEAST_TURN <= self.angle <= MOST_TURN and self.length >= LEAST_LENGTH
+        return MIN_TURN <= self.angle <= MAX_TURN and self.length >= MIN_LENGTH
 
     def at(self, share: Array) -> Array:
         """Return points at shares of it (K,), (K, 3)."""

@@ -20,7 +20,7 @@ from selfmotion.shop.controllers.tool_frames import ToolFrames
 # Times at which speeds are evaluated, per interval between two samples.
 _BETWEEN = 4
 # Smallest number of such times in all.
-_FEWEST = 1600
+_MIN_TIMES = 1600
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class ArcLength:
         marks = np.concatenate([[first], inside, [last]])
         count = _BETWEEN * (len(marks) - 1) + 1
         t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-        t = np.union1d(t, np.linspace(first, last, _FEWEST))
+        t = np.union1d(t, np.linspace(first, last, _MIN_TIMES))
         # Two that rounding puts beside each other are one.
         t = t[np.append(np.diff(t) > 1e-9 * (last - first), True)]
         here, middle = speeds(t), speeds(0.5 * (t[1:] + t[:-1]))
@@ -119,7 +119,7 @@ _LOOKS = 3200
 # Smallest number of times at which a step between two targets is evaluated.
 _OF_STEP = 16
 # Length of path below which the tool rests [m].
-_LEAST = 1e-6
+_MIN_LENGTH = 1e-6
 # Relative difference of speeds that counts as rounding of digits.
 _SAME = 1e-4
 
@@ -276,7 +276,7 @@ class FeedSegment(PoseSegment):
             A speed is not that of the path.
         """
         travel = ArcLength.of_path(path, first, first + self.seconds)
-        if travel.whole < _LEAST:
+        if travel.whole < _MIN_LENGTH:
             raise FileFormatError(
                 f"'{self.name}' moves where the path rests: the program is of another one"
             )

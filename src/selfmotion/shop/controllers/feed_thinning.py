@@ -47,7 +47,7 @@ _POSITION_SHARES = (1.0, 0.3)
 # Smallest number of samples along a segment.
 _MIN_SAMPLES = 400
 # Largest number of samples along a segment.
-_MOST = 2000
+_MAX_SAMPLES = 2000
 # Length below which a segment has no feed [m].
 _MIN_LENGTH = 1e-3
 # Shortest step [m].
@@ -220,7 +220,7 @@ class FeedSection(PoseSection):
     def _sampled(self, travel: ArcLength, fixed: Array) -> SampledPoses:
         motion = self.operation.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
-        inside = inside[:: max(1, len(inside) // (_MOST - _MIN_SAMPLES))]
+        inside = inside[:: max(1, len(inside) // (_MAX_SAMPLES - _MIN_SAMPLES))]
         even = np.linspace(0.0, travel.whole, _MIN_SAMPLES + 1)
         others = np.unique(np.concatenate([even, travel.at(inside)]))
         others = others[np.append(True, np.diff(others) > _MIN_STEP)]

@@ -32,7 +32,7 @@ from selfmotion.work.job import Program, are_opposite
 # Rounding of times in files [s].
 _MOMENT = 1e-4
 # Rounding of angles in files [rad].
-_LEAST = 1e-6
+_ANGLE_ROUNDING = 1e-6
 # Rounding of the ends of a program in joints [rad or m].
 _DIGITS = 1e-6
 # Rounding of its ends in poses, as joints [rad or m].
@@ -86,7 +86,9 @@ def stated_deviation(program: ControllerProgram) -> Tolerance | None:
         return program.within
     deviation = program.deviation.path
     sound = np.isfinite([deviation.position, deviation.rotation]).all() and deviation.position > 0.0
-    return Tolerance(deviation.position, max(deviation.rotation, _LEAST)) if sound else None
+    return (
+        Tolerance(deviation.position, max(deviation.rotation, _ANGLE_ROUNDING)) if sound else None
+    )
 
 
 class JudgedProgram(NamedTuple):

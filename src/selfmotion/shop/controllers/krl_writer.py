@@ -48,7 +48,7 @@ _WORDS = (
 # Speed above all that the times of targets need [m/s].
 _UNBOUND = 2.0
 # Largest $VEL.CP [m/s].
-_MOST = 3.0
+_MAX_SPEED = 3.0
 # Ratio of the speed that is set to the speed that times need.
 _ABOVE_TIMES = 1.02
 # Length of path below which it has no direction [m].
@@ -213,7 +213,7 @@ _AT_TARGET = TRIGGER.partition("$OUT")[0]
 def _unbound(segment: PoseSegment) -> float:
     """Return a speed above what the times of a segment need, if $VEL.CP can be it [m/s]."""
     fast, _ = fastest_between(segment.t, segment.positions, segment.quaternions)
-    return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_TIMES * fast) / 1e3), _MOST))
+    return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_TIMES * fast) / 1e3), _MAX_SPEED))
 
 
 def _is_straight(segment: PoseSegment) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.model.task import Task
-from selfmotion.shop.controllers.arcs import LEAST_LENGTH, arc_through, put_on_arcs
+from selfmotion.shop.controllers.arcs import MIN_LENGTH, arc_through, put_on_arcs
 from selfmotion.shop.controllers.segments import straight
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
@@ -159,7 +159,7 @@ class StepSearch:
             arc_end = start
             if line_end < last:
                 # An arc needs a sample inside, and the length that controllers accept.
-                long_enough = int(np.searchsorted(travel, travel[start] + LEAST_LENGTH))
+                long_enough = int(np.searchsorted(travel, travel[start] + MIN_LENGTH))
                 least = min(max(line_end + 1, start + 2, long_enough), last)
                 arc_end = self._farthest_end(start, last, is_circular=True, least=least)
             end = max(line_end, arc_end)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, PlanError, ProblemError, shown
-from selfmotion.model.motion import MOST_SAMPLES, Trajectory
+from selfmotion.model.motion import MAX_SAMPLES, Trajectory
 from selfmotion.planning.result import Move, Parts, Plan, at_rate, is_retimed
 from selfmotion.work.job import Program
 
@@ -17,7 +17,7 @@ _DIGITS = 9
 # Difference of times that are written alike: two roundings to whole nanoseconds [s].
 _UNEVEN = 2.1e-9
 # Smallest number of samples of a motion.
-_FEWEST = 4
+_MIN_SAMPLES = 4
 # Shares of an interval at which straight lines are compared with the motion.
 _BETWEEN = (0.25, 0.5, 0.75)
 # Smallest factor between rates that are tried in turn.
@@ -25,7 +25,7 @@ _FASTER = 1.01
 # Deviation of cubics that counts as none [rad or m].
 _AS_GOOD_AS = 1e-8
 # Largest number of halvings of an interval until its cubic is as near.
-_MOST_HALVINGS = 12
+_MAX_HALVINGS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +64,10 @@ class MotionSamples:
             t = np.round(motion.t - motion.t[0], _DIGITS)
         else:
             known = isinstance(rate, Real) and np.isfinite(float(rate))
-            if not (known and 1.0 <= rate * motion.duration <= MOST_SAMPLES):
+            if not (known and 1.0 <= rate * motion.duration <= MAX_SAMPLES):
                 raise ProblemError(
                     f"rate is {shown(rate)} Hz, expected a number above "
-                    f"{1.0 / motion.duration:.4g} and up to {MOST_SAMPLES / motion.duration:.4g}, "
+                    f"{1.0 / motion.duration:.4g} and up to {MAX_SAMPLES / motion.duration:.4g}, "
                     f"so that the motion of {motion.duration:.6g} s has samples, not too many"
                 )
             t = np.round(motion.sample_times(rate), _DIGITS)
@@ -152,9 +152,9 @@ def _rate_that_keeps(plan: Plan) -> float | None:
 
     # The samples of the plan itself lie too far apart for more than a first guess.
     rate, _ = needed(None)
-    if rate * duration <= MOST_SAMPLES:
+    if rate * duration <= MAX_SAMPLES:
         rate = needed(rate)[0]
-    while rate * duration <= MOST_SAMPLES:
+    while rate * duration <= MAX_SAMPLES:
         better, suffices = needed(rate)
         if suffices:
             return rate
@@ -172,7 +172,7 @@ def coarsest_rate(plan: Plan) -> float | None:
     needed = _rate_that_keeps(plan)
     if needed is None:
         return None
-    rate = max(needed, float(np.ceil(_FEWEST / motion.duration)))
+    rate = max(needed, float(np.ceil(_MIN_SAMPLES / motion.duration)))
     if rate * motion.duration >= len(motion.t) - 1:
         return None
     samples = MotionSamples.of(motion, rate)
@@ -217,7 +217,7 @@ def for_cubics(motion: Trajectory) -> Trajectory:
 
     For files without accelerations: each interval is halved until its cubic is near enough.
     """
-    for _ in range(_MOST_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         t = motion.t
         middle = 0.5 * (t[1:] + t[:-1])
         cubic = Trajectory(t, motion.q, motion.qd, motion.joint_names)

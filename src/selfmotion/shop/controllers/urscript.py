@@ -58,7 +58,7 @@ _SHARE = 0.45
 # Factor of speeds, which are written in four digits.
 _UP = 1.001
 # Length of path at which the arm goes on where the tool turns in place [m].
-_LEAST = 1e-5
+_MIN_LENGTH = 1e-5
 
 
 def _six(reader: ProgramReader, text: str) -> list[float]:
@@ -254,7 +254,7 @@ class UrscriptWriter(ProgramWriter):
         lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         radii = np.zeros(len(segment.t))
         most = ZONE if isinstance(segment, FeedSegment) else _BLEND
-        radii[1:-1] = np.clip(_SHARE * np.minimum(lengths[:-1], lengths[1:]), _LEAST, most)
+        radii[1:-1] = np.clip(_SHARE * np.minimum(lengths[:-1], lengths[1:]), _MIN_LENGTH, most)
         return radii
 
 
@@ -346,7 +346,7 @@ class UrscriptReader(ProgramReader):
         most, positions = np.full(len(radii), _BLEND), self._places()
         if positions is not None:
             lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-            most = np.maximum(0.5 * np.minimum(lengths[:-1], lengths[1:]), _LEAST)
+            most = np.maximum(0.5 * np.minimum(lengths[:-1], lengths[1:]), _MIN_LENGTH)
         far = (radii > most) | (radii < 0.0)
         if far.any():
             k = int(np.argmax(far))

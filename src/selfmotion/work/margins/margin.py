@@ -25,7 +25,7 @@ from selfmotion.work.margins.subjects import (
 # The largest shift that is considered [m].
 _FARTHEST = 1.0
 # The largest rotation that is considered [rad].
-_MOST_TURNED = 0.5
+_MAX_TURNED = 0.5
 
 
 def margin(
@@ -151,7 +151,7 @@ def _margin_of(
         return _displacement(subject, size, *stop)
 
     translation = most(Size(1.0, 0.0), _FARTHEST)
-    rotation = most(Size(0.0, 1.0), _MOST_TURNED)
+    rotation = most(Size(0.0, 1.0), _MAX_TURNED)
     both = most(Size(translation.position, rotation.rotation), 1.0)
     return SubjectMargin(
         subject.name, subject.bodies, subject.about, subject.center, translation, rotation, both

@@ -18,7 +18,7 @@ _IN_ONE = 8
 # dearer than the best.
 _BEGINNINGS = 32
 # First places at most if none of these has a motion.
-_MOST_BEGINNINGS = 64
+_MAX_BEGINNINGS = 64
 # Best first places that the descent starts from.
 _FINALISTS = 3
 # Beginnings nearer to each other than this go on once [share of the box].
@@ -196,7 +196,7 @@ def best_place(
     """
     tried: list[Tried] = [*known]
     count, first = min(_IN_ONE * 2 ** (len(box.low) - 1), _BEGINNINGS), 0
-    while first < _MOST_BEGINNINGS:
+    while first < _MAX_BEGINNINGS:
         tried += every([one for one in beginnings(box, first, count) if one.any()])
         if any(np.isfinite(item.cost) for item in tried):
             break
