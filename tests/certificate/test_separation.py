@@ -67,7 +67,7 @@ class Bodies:
 @pytest.mark.parametrize("most", [1, 4, 200_000])
 def test_what_is_not_looked_at_is_never_kept(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two bodies that meet for an instant, while another pair nearly does all the time."""
-    monkeypatch.setattr("selfmotion.certificate.separation._MOST", most)
+    monkeypatch.setattr("selfmotion.certificate.separation._MAX_INTERVALS", most)
     motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
     bodies = Bodies(
         lambda q: np.full(len(q), 1e-7),

@@ -135,9 +135,8 @@ def has_curves(formulation: Formulation) -> bool:
 
 def waypoint_times(formulation: Formulation) -> Array:
     """Return times (W,) [s] at which to search for a problem's configurations."""
-    return search_times(
-        formulation.path, _MIN_TIMES_ON_CURVES if has_curves(formulation) else _MIN_TIMES
-    )
+    fewest = _MIN_TIMES_ON_CURVES if has_curves(formulation) else _MIN_TIMES
+    return search_times(formulation.path, fewest)
 
 
 def search_times(path: Path, fewest: int) -> Array:
