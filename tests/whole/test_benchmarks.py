@@ -3,10 +3,13 @@
 import importlib.util
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+import selfmotion as sm
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 
@@ -46,3 +49,14 @@ def test_an_unknown_name_is_refused_with_those_that_there_are() -> None:
     assert ended.returncode == 2
     assert "place-s" in ended.stdout
     assert "places" in ended.stdout
+
+
+def test_equivalent_mutants_are_of_lines_that_are_there() -> None:
+    """A line that has changed is judged anew."""
+    listed = tomllib.loads((FOLDER / "data/equivalent_mutants.toml").read_text())["mutant"]
+    source = Path(sm.__file__).parent
+    assert len(listed) > 0
+    for item in listed:
+        file = source / item["file"]
+        assert file.is_file(), item
+        assert item["before"].strip() in file.read_text("utf-8"), item
