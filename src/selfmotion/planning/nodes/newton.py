@@ -382,7 +382,8 @@ def _merit(solver: _Solver, motion: NodeMotion, slacks: Array, elastics: Array) 
 
 def _to_boundary(values: Array, step: Array) -> float:
     """Return the largest share of a step, at most 1, by the fraction-to-the-boundary rule."""
-    return _largest_share(values, step, SETTINGS.tau)
+    # Without compilation the kernel returns a scalar of NumPy.
+    return float(_largest_share(values, step, SETTINGS.tau))
 
 
 @kernel

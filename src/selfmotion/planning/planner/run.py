@@ -70,7 +70,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         gradient_evaluations=counts.gradients,
         jacobian_evaluations=counts.jacobians,
         steps=len(motion.trajectory.t) - 1,
-        iterations=sum(iteration.step > 0.0 for iteration in solution.history),
+        iterations=len([one for one in solution.history if one.step > 0.0]),
         history=solution.history,
         status=status,
         message=message_of(
