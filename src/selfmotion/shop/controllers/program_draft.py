@@ -18,6 +18,7 @@ from selfmotion.shop.controllers.controller_axes import axes_of, in_order, tool_
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.feed_thinning import paced_section
+from selfmotion.shop.controllers.operations import Operation, operations_of
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load
 from selfmotion.shop.controllers.program_settings import OF_PATH, ProgramSettings, Signal
@@ -29,7 +30,7 @@ from selfmotion.shop.controllers.targets import (
     PoseSection,
     segments_of,
 )
-from selfmotion.shop.controllers.thinning import Operation, Section, operations_of
+from selfmotion.shop.controllers.thinning import Section
 from selfmotion.shop.controllers.tool_frames import ToolFrames, axis_inside_arm
 from selfmotion.shop.controllers.work_objects import frame_of_paths
 from selfmotion.work.job import Program, are_opposite

@@ -11,6 +11,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.operations import Operation
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.segments import (
     NO_DEVIATION,
@@ -23,7 +24,7 @@ from selfmotion.shop.controllers.segments import (
     aligned_quaternions,
     finer,
 )
-from selfmotion.shop.controllers.thinning import Operation, Section, is_at_rest
+from selfmotion.shop.controllers.thinning import Section, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # As few tool poses as keep a controller near a motion.
@@ -69,7 +70,7 @@ class PoseSection(Section):
     rounding: Rounding
 
     min_density: ClassVar[float] = 0.02
-    fewest: ClassVar[int] = 2
+    min_targets: ClassVar[int] = 2
 
     @override
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
@@ -326,10 +327,10 @@ def _allowed(operation: Operation, allowed: Tolerance, of_moves: Tolerance | Non
     """Return how far a controller may be off an operation."""
     if not operation.is_move:
         return allowed
-    if of_moves is not None or operation.room is None:
+    limit = operation.deviation_limit
+    if of_moves is not None or limit is None:
         return of_moves or allowed
-    room = operation.room
-    return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
+    return Tolerance(max(allowed.position, limit.position), max(allowed.rotation, limit.rotation))
 
 
 def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
