@@ -61,4 +61,4 @@ from selfmotion.shop.controllers.target_constraints import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,
 )
-from selfmotion.shop.controllers.work_objects import turned_base as turned_base
+from selfmotion.shop.controllers.work_objects import base_rotation_note as base_rotation_note
