@@ -21,8 +21,8 @@ from selfmotion.shop.controllers import (
 )
 from selfmotion.shop.controllers.configurations import confdata, status_and_turn
 from selfmotion.shop.controllers.controller_axes import axes_of
+from selfmotion.shop.controllers.deviations import Deviation, Deviations, deviation_between
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
-from selfmotion.shop.controllers.segments import Deviation, Deviations, deviation_between
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 from selfmotion.shop.controllers.work_objects import frame_of_paths
 from support.arms import PANDA_HOME, robot_named

@@ -15,8 +15,8 @@ from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import judged_program, program_deviation, read_program
 from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
+from selfmotion.shop.controllers.deviations import NO_DEVIATION
 from selfmotion.shop.controllers.operations import Operation
-from selfmotion.shop.controllers.segments import NO_DEVIATION
 from selfmotion.shop.controllers.thinning import Section
 from selfmotion.work.job import Step
 from support.arms import PANDA_HOME, robot_named

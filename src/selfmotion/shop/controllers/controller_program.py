@@ -13,18 +13,12 @@ from selfmotion.model.path import Path
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers.controller_axes import Axis
+from selfmotion.shop.controllers.deviations import NO_DEVIATION, Deviations, deviation_of
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.operations import operations_of
 from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
-from selfmotion.shop.controllers.segments import (
-    NO_DEVIATION,
-    Deviations,
-    Knots,
-    Segment,
-    by_interpolation,
-    deviation_of,
-)
+from selfmotion.shop.controllers.segments import Knots, Segment, by_interpolation
 from selfmotion.shop.controllers.work_objects import WORLD
 from selfmotion.work.job import Program
 

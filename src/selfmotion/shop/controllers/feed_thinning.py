@@ -16,9 +16,11 @@ from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.arcs import arc_through, step_lengths
+from selfmotion.shop.controllers.deviations import SAMPLING_FACTOR, Deviation
 from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
 from selfmotion.shop.controllers.operations import Operation
 from selfmotion.shop.controllers.pose_numbers import Rounding
+from selfmotion.shop.controllers.pose_segments import aligned_quaternions
 from selfmotion.shop.controllers.pose_steps import (
     NoStepError,
     SampledPoses,
@@ -27,15 +29,7 @@ from selfmotion.shop.controllers.pose_steps import (
     StepTolerance,
 )
 from selfmotion.shop.controllers.program_texts import TIMES_HEADING
-from selfmotion.shop.controllers.segments import (
-    SAMPLING_FACTOR,
-    Deviation,
-    Event,
-    Knots,
-    Segment,
-    aligned_quaternions,
-    by_interpolation,
-)
+from selfmotion.shop.controllers.segments import Event, Knots, Segment, by_interpolation
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames

@@ -20,12 +20,12 @@ from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_draft import constraints_of
 from selfmotion.shop.controllers.program_facts import check_load
 from selfmotion.shop.controllers.program_files import program_deviation, read_program
 from selfmotion.shop.controllers.program_steps import StepMotions, step_motions
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.segments import PoseSegment
 from selfmotion.shop.controllers.target_constraints import (
     constraints_of_lines,
     constraints_of_targets,

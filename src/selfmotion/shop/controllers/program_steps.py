@@ -12,7 +12,8 @@ from selfmotion.model.path import Path
 from selfmotion.planning.result import Move
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
-from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.pose_segments import PoseSegment
+from selfmotion.shop.controllers.segments import Segment
 from selfmotion.work.job import Program, Step
 
 

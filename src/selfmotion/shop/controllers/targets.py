@@ -11,19 +11,16 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.shop.controllers.operations import Operation
-from selfmotion.shop.controllers.pose_numbers import Rounding
-from selfmotion.shop.controllers.segments import (
+from selfmotion.shop.controllers.deviations import (
     NO_DEVIATION,
     SAMPLING_FACTOR,
     Deviation,
     Deviations,
-    Event,
-    PoseSegment,
-    Segment,
-    aligned_quaternions,
-    finer,
 )
+from selfmotion.shop.controllers.operations import Operation
+from selfmotion.shop.controllers.pose_numbers import Rounding
+from selfmotion.shop.controllers.pose_segments import PoseSegment, aligned_quaternions
+from selfmotion.shop.controllers.segments import Event, Segment, subdivided
 from selfmotion.shop.controllers.thinning import Section, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
@@ -91,7 +88,7 @@ class PoseSection(Section):
             return
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         marks = np.concatenate([[self.first], inside, [self.last]])
-        t = finer(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
+        t = subdivided(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
         far = _OF_POSES / np.maximum(self.frames.smallest_singular_values(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
             at = float(t[int(far.argmax())] - motion.t[0])

@@ -17,16 +17,15 @@ from selfmotion.basics import Array, Flags, ProblemError
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import Chain
-from selfmotion.shop.controllers.operations import Operation
-from selfmotion.shop.controllers.pose_numbers import ANGLE_DIGITS, LENGTH_DIGITS, TIME_DIGITS
-from selfmotion.shop.controllers.segments import (
+from selfmotion.shop.controllers.deviations import (
     NO_DEVIATION,
     Deviation,
-    Event,
-    Segment,
     deviation_between,
     deviation_of,
 )
+from selfmotion.shop.controllers.operations import Operation
+from selfmotion.shop.controllers.pose_numbers import ANGLE_DIGITS, LENGTH_DIGITS, TIME_DIGITS
+from selfmotion.shop.controllers.segments import Event, Segment
 
 # Share of a feed's tolerance that targets may use at the evaluated times: the error is larger in
 # between.
@@ -208,7 +207,7 @@ class Section:
         return np.where(self.slides, 1e-3 * np.round(1e3 * q, LENGTH_DIGITS), degrees)
 
     def _check_digits(self, allowed: Tolerance) -> None:
-        """Refuse a tolerance below the rounding of targets to the digits of files."""
+        """Raise ProblemError for a tolerance below the rounding of targets in files."""
         q = self.operation.motion.q
         deviation = deviation_between(self._rounded(q), q, self.operation.chains)
         if deviation.share(allowed) > 1.0:

@@ -14,13 +14,14 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
 from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, urscript_numbers, urscript_pose
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings
 from selfmotion.shop.controllers.program_texts import pose_values
 from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
 from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
-from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.segments import Segment
 from selfmotion.shop.controllers.statements import (
     Field,
     Language,
