@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.shell.cli import app
-from selfmotion.shell.cli.documents import Said, read
+from selfmotion.shell.cli.documents import DocumentOptions, read
 from selfmotion.shell.cli.moved import MOVED, moved
 from selfmotion.shell.documents import json_schema, keys_of, parse_setting, set_key
 from support.arms import PANDA_HOME, robot_named
@@ -179,8 +179,8 @@ def test_a_key_of_the_shell_leaves_the_rest_as_the_file_says(tmp_path: Path) -> 
     assert invoke("init", "panda", "--out", file)[0] == 0
     text = file.read_text().replace("duration = 4.0", "feed = 0.2")
     file.write_text(f"{text}\n[search]\nstarts = 7\nmode = 'global'\n")
-    said = Said(["search.compare=true"], feed=0.1, task="position")
-    found, known = read(str(file), said), read(str(file), Said())
+    said = DocumentOptions(["search.compare=true"], feed=0.1, task="position")
+    found, known = read(str(file), said), read(str(file), DocumentOptions())
     assert found.search == replace(known.search, compare=True)
     assert (found.problem.path.feed, found.problem.task) == (0.1, sm.Task.POSITION)
     assert known.problem.path.feed == 0.2

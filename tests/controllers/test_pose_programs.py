@@ -13,16 +13,16 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import (
+    base_rotation_note,
     judged_program,
     program_deviation,
     program_files,
     read_program,
-    turned_base,
 )
 from selfmotion.shop.controllers.configurations import confdata, status_and_turn
 from selfmotion.shop.controllers.controller_axes import axes_of
+from selfmotion.shop.controllers.deviations import Deviation, Deviations, deviation_between
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
-from selfmotion.shop.controllers.segments import Deviation, Deviations, deviation_between
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 from selfmotion.shop.controllers.work_objects import frame_of_paths
 from support.arms import PANDA_HOME, robot_named
@@ -598,7 +598,7 @@ def test_numbers_of_work_objects_in_other_units_are_refused(given: str, said: st
 
 
 def test_a_base_that_is_turned_is_told() -> None:
-    assert "'base', the controller's frame, which is turned by 180°" in turned_base(
+    assert "'base', the controller's frame, which is rotated by 180°" in base_rotation_note(
         robot_named("ur5")
     )
-    assert not turned_base(robot_named("panda"))
+    assert not base_rotation_note(robot_named("panda"))

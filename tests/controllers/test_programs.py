@@ -15,8 +15,9 @@ from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import judged_program, program_deviation, read_program
 from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
-from selfmotion.shop.controllers.segments import NO_DEVIATION
-from selfmotion.shop.controllers.thinning import Operation, Section
+from selfmotion.shop.controllers.deviations import NO_DEVIATION
+from selfmotion.shop.controllers.operations import Operation
+from selfmotion.shop.controllers.thinning import Section
 from selfmotion.work.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import two_seams
@@ -733,7 +734,7 @@ def test_targets_are_not_nearer_than_a_controller_s_cycle() -> None:
     q[:, 0] += np.concatenate([[0.0], np.cumsum(0.5 * (qd[1:, 0] + qd[:-1, 0]) * np.diff(t))])
     motion = sm.Trajectory(t, q, qd, ur5.joint_names, qdd)
     speeds = np.abs(motion(np.linspace(0.0, 2.0, 4001), 1)).max(axis=0) / FULL
-    operation = Operation("seam", motion, (), (ur5.chain,), speeds=np.maximum(speeds, 1e-9))
+    operation = Operation("seam", motion, (), (ur5.chain,), speed_limits=np.maximum(speeds, 1e-9))
     slides = np.zeros(ur5.dof, dtype=bool)
     stretch, _ = Section(operation, slides, 0.0, 2.0).thinned(sm.Tolerance(1e-4, 1e-3))
     assert np.diff(stretch.t).min() >= CYCLE

@@ -164,7 +164,7 @@ def test_normals_that_seem_to_point_out_are_told(
     def refused(*_: object, **__: object) -> sm.Plan:
         raise sm.errors.PlanError("not planned here")
 
-    monkeypatch.setattr("selfmotion.shell.cli.commands.plan_with_progress", refused)
+    monkeypatch.setattr("selfmotion.shell.cli.plan_commands.plan_with_progress", refused)
     job = tmp_path / "a.toml"
     job.write_text(
         'task = "pointing"\nrobot.name = "panda"\n[seams]\nfile = "b.csv"\nfeed = 0.05\n'

@@ -90,7 +90,7 @@ def test_a_makers_limits_stay_unless_they_are_replaced(panda: sm.RobotModel) -> 
         (lambda d: d.update(joint_limit={}), "joint_limit: unknown key; nearest: 'joint_limits'"),
         (lambda d: d.update(default_velocity_scaling_factor=1.5), "is 1.5, expected a number ab"),
         (lambda d: d["joint_limits"].pop("panda_joint1"), ""),
-        (lambda d: d.update(joint_limits={"joint_1": {}}), "knows none of the joints of panda"),
+        (lambda d: d.update(joint_limits={"joint_1": {}}), "has none of the joints of panda"),
         (lambda d: _joint(d).pop("max_velocity"), "has_velocity_limits is true, but max_velocity"),
         (
             lambda d: _joint(d).update(max_velocity=-1.0),

@@ -87,7 +87,7 @@ def unplanned(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object, **__: object) -> sm.Plan:
         raise sm.errors.PlanError("not planned here")
 
-    monkeypatch.setattr("selfmotion.shell.cli.commands.plan_with_progress", refused)
+    monkeypatch.setattr("selfmotion.shell.cli.plan_commands.plan_with_progress", refused)
 
 
 def told(*arguments: str | Path) -> str:
@@ -212,10 +212,10 @@ def test_what_files_beside_an_arm_do_not_say_is_told(tmp_path: Path) -> None:
     )
     said = told("panda", *on_line("0,0.02,0"), *files)
     notes = (
-        "limits are taken for rad and s (m of joints that slide), as MoveIt's are",
+        "limits are read in rad and s (m for prismatic joints), as MoveIt's are",
         "default_velocity_scaling_factor 0.5 is applied",
         "left out, as the arm does not have them: finger",
-        "joint_limits.yaml: passed over: max_effort",
+        "joint_limits.yaml: ignored: max_effort",
         "passed over: <group>, <disable_default_collisions>",
         "mesh 'part': part.stl says no unit: taken for metres (else: scale)",
     )

@@ -4,16 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
-import typer
 
 import selfmotion as sm
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.shell.cli import documents
-from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
+from selfmotion.shell.cli.app import print_json, stages, terminal
 from selfmotion.shop import controllers
 
 _Near = Mapping[str, Extreme]
@@ -31,7 +30,7 @@ class Wanted(NamedTuple):
     plan : Plan or None
         The plan that it comes from.
     notes : tuple of str
-    said : Said
+    said : DocumentOptions
         What is asked besides.
     task : Task or None
         In place of the problem's, where that leaves no joint to spare.
@@ -42,7 +41,7 @@ class Wanted(NamedTuple):
     ending: str = ""
     plan: sm.Plan | None = None
     notes: tuple[str, ...] = ()
-    said: documents.Said = documents.Said()
+    said: documents.DocumentOptions = documents.DocumentOptions()
     task: sm.Task | None = None
 
 
@@ -134,7 +133,7 @@ def print_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
 
 def of_plan(
     plan: sm.Plan,
-    said: documents.Said,
+    said: documents.DocumentOptions,
     within: sm.Tolerance | None,
     progress: Progress,
     calibration: Path | None,
@@ -212,10 +211,10 @@ def near(
     )
 
 
-def of_program(
+def check_program(
     file: Path, job: Path, within: sm.Tolerance | None, as_json: bool, verbose: bool
-) -> NoReturn:
-    """Judge a controller's program by the job that it is of, each step and the whole, and end."""
+) -> bool:
+    """Judge a controller's program by its job, print the verdict, and return whether it holds."""
     if not is_program(file):
         raise sm.errors.ProblemError(
             f"{file}: is no program of a controller, which {job} could judge"
@@ -236,4 +235,4 @@ def of_program(
             text = f"{step.name}: {step.verdict}"
             terminal.print(text, style=style, markup=False, soft_wrap=True)
         terminal.print(judged.verdict, markup=False, soft_wrap=True)
-    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+    return verified

@@ -30,7 +30,7 @@ _LOOKS = 7
 
 
 @dataclass(frozen=True)
-class Said:
+class DocumentOptions:
     """What the shell says of a document: short forms of keys, and keys.
 
     Attributes
@@ -82,7 +82,7 @@ class Said:
             set_key(document, key, value)
 
     @property
-    def typed(self) -> dict[str, Any]:
+    def by_option(self) -> dict[str, Any]:
         """What was typed, by the option."""
         names = ("path", "feed", "frame", "task", "start", "tool")
         return {"set": self.settings, **{name: getattr(self, name) for name in names}}
@@ -101,13 +101,13 @@ _SHAPES = ("circle", "line", "spiral")
 def document_of(file: Path, settings: Sequence[str] | None) -> dict[str, Any]:
     """Return what a file says, with what is set besides."""
     document = read_document(file)
-    Said(settings).set_in(document, file.parent)
+    DocumentOptions(settings).set_in(document, file.parent)
     return document
 
 
 def read(
     given: str,
-    said: Said,
+    said: DocumentOptions,
     allow_code: bool = False,
     *,
     start: Any = None,
@@ -145,7 +145,7 @@ def _are_known(document: Mapping[str, Any]) -> bool:
     return set(document) <= set(json_schema()["properties"])
 
 
-def of_file(file: Path, said: Said, allow_code: bool = False) -> sm.files.PlanRequest:
+def of_file(file: Path, said: DocumentOptions, allow_code: bool = False) -> sm.files.PlanRequest:
     """Return the request of a problem file, with what the shell says of it."""
     document = read_document(file)
     if "grid" in document:
@@ -155,14 +155,14 @@ def of_file(file: Path, said: Said, allow_code: bool = False) -> sm.files.PlanRe
     return _request_of(document, file, allow_code)
 
 
-def problem_of(file: Path, said: Said, allow_code: bool = False) -> sm.Problem:
+def problem_of(file: Path, said: DocumentOptions, allow_code: bool = False) -> sm.Problem:
     """Return the problem of a problem file, or of a plan."""
     if file.suffix != ".npz":
         return of_file(file, said, allow_code).problem
     return changed(sm.load_plan(file).problem, said)
 
 
-def changed(problem: sm.Problem, said: Said) -> sm.Problem:
+def changed(problem: sm.Problem, said: DocumentOptions) -> sm.Problem:
     """Return a problem with keys of its file set otherwise; the same one where nothing is said.
 
     Raises
@@ -170,7 +170,7 @@ def changed(problem: sm.Problem, said: Said) -> sm.Problem:
     ProblemError
         A key says how to plan, or the problem is none with it.
     """
-    if not any(said.typed.values()):
+    if not any(said.by_option.values()):
         return problem
     refuse_how_to_plan(said)
     document = problem_document(problem, Path("problem.toml"))
@@ -178,7 +178,7 @@ def changed(problem: sm.Problem, said: Said) -> sm.Problem:
     return plan_request_of(document).problem
 
 
-def refuse_how_to_plan(said: Said, besides: str = "") -> None:
+def refuse_how_to_plan(said: DocumentOptions, besides: str = "") -> None:
     """Raise ProblemError for a key that says how to plan a motion that is there.
 
     All but `besides`, a key that has an effect.
@@ -193,7 +193,7 @@ def refuse_how_to_plan(said: Said, besides: str = "") -> None:
             )
 
 
-def refuse_costs(said: Said) -> None:
+def refuse_costs(said: DocumentOptions) -> None:
     """Raise ProblemError for keys of costs, which no verdict depends on."""
     for text in said.settings or ():
         key, _ = parse_setting(text)

@@ -49,7 +49,7 @@ _OF_OTHERS = {"start": "free", "rest": False}
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class CheckRequest:
     """A file to check, and what it is judged by.
 
     Attributes
@@ -57,7 +57,7 @@ class Asked:
     file : Path
     robot : str or None
         A robot, a problem file, a plan, or a job's program.
-    said : Said
+    said : DocumentOptions
         What else is asked of the motion.
     calibration : Path or None
     degrees : bool
@@ -66,7 +66,7 @@ class Asked:
 
     file: Path
     robot: str | None
-    said: documents.Said
+    said: documents.DocumentOptions
     calibration: Path | None
     degrees: bool
     within: sm.Tolerance | None
@@ -87,9 +87,9 @@ class Asked:
         if self.is_job:
             whose = "the program's" if self.file.suffix == jobs.PROGRAM else "the parts'"
             more = {"robot": self.robot, "tolerance": self.within}
-            options.refuse(self.said.typed | besides | more, self.file, whose)
+            options.refuse(self.said.by_option | besides | more, self.file, whose)
         elif self.is_of_program:
-            options.refuse(self.said.typed | besides, str(self.robot), "the program's")
+            options.refuse(self.said.by_option | besides, str(self.robot), "the program's")
         elif self.file.suffix == ".npz":
             own = {"robot": self.robot, "degrees": self.degrees}
             options.refuse(own, self.file, "the plan's")

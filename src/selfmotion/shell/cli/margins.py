@@ -242,7 +242,7 @@ def plan_margin(
     Of a problem file, or of the problem of a plan (.npz).
     """
     outputs.check_suffixes(out or [])
-    problem = documents.problem_of(file, documents.Said(settings), allow_code)
+    problem = documents.problem_of(file, documents.DocumentOptions(settings), allow_code)
     with StageDisplay(stages) as display:
         planned = sm.plan_with_margin(
             problem,

@@ -14,7 +14,7 @@ from selfmotion.certificate import Extreme
 from selfmotion.model.task import SE3
 from selfmotion.shell.cli import reread, result_json, summaries, tables
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
-from selfmotion.shell.cli.documents import Said
+from selfmotion.shell.cli.documents import DocumentOptions
 from selfmotion.shop import controllers
 
 
@@ -25,13 +25,13 @@ def program_settings(
     if file is None and not settings:
         return None
     document = {} if file is None else basics.read_document(file)
-    Said(settings).set_in(document, Path() if file is None else file.parent)
+    DocumentOptions(settings).set_in(document, Path() if file is None else file.parent)
     return controllers.program_settings_of(document, "--set" if file is None else str(file))
 
 
 def print_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
     """Print how the frame that a work object in numbers is counted in is turned from the root."""
-    told = controllers.turned_base(robot)
+    told = controllers.base_rotation_note(robot)
     if told and asked is not None and isinstance(asked.work_object, SE3):
         stages.print(f"note: {told}", markup=False, soft_wrap=True)
 

@@ -35,17 +35,15 @@ def finish_parts(
     raise typer.Exit(VERIFIED if parts.verified else NOT_VERIFIED)
 
 
-def check_saved(file: Path, as_json: bool, verbose: bool) -> NoReturn:
-    """Load a program or parts, which are judged anew, print the verdict, and exit."""
+def check_saved(file: Path, as_json: bool, verbose: bool) -> bool:
+    """Load a program or parts, print the verdict, and return whether they are verified."""
     if file.suffix == PARTS:
         parts = sm.files.load_parts(file)
         _show_parts(parts, as_json, verbose)
-        verified = parts.verified
-    else:
-        program = sm.load_program(file)
-        jobs.show_program(program, as_json, verbose)
-        verified = program.verified
-    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+        return parts.verified
+    program = sm.load_program(file)
+    jobs.show_program(program, as_json, verbose)
+    return program.verified
 
 
 def _write(parts: sm.Parts, file: Path) -> None:

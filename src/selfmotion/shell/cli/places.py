@@ -69,7 +69,7 @@ def place(
         moved == "base",
         part,
         moved == "path",
-        documents.Said(settings),
+        documents.DocumentOptions(settings),
     )
     request.check(drawn or [])
     read = request.documents()
@@ -127,7 +127,7 @@ class _Asked:
     files, out : tuple of Path
     base, path_alone : bool
     part : list of str or None
-    said : Said
+    said : DocumentOptions
     """
 
     files: tuple[Path, ...]
@@ -135,7 +135,7 @@ class _Asked:
     base: bool
     part: list[str] | None
     path_alone: bool
-    said: documents.Said
+    said: documents.DocumentOptions
 
     def check(self, drawn: Sequence[Path]) -> None:
         """Raise where options contradict each other, or a file is of no known kind."""

@@ -205,7 +205,7 @@ def follow(
 
     document = documents.document_of(file, settings)
     loop = following.loop_of(document, file)
-    problem = documents.of_file(file, documents.Said(settings), allow_code).problem
+    problem = documents.of_file(file, documents.DocumentOptions(settings), allow_code).problem
     left = [key for key in document if key in _OF_PLANS]
     if left:
         _print_note(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")

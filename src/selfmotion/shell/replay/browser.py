@@ -19,7 +19,7 @@ from selfmotion.basics import (
     write_atomically,
     write_bytes,
 )
-from selfmotion.shell.replay.page import Shown, replay_html
+from selfmotion.shell.replay.page import Replayable, replay_html
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Draw on the processor: the same picture on every machine, and no display needed.
@@ -28,7 +28,7 @@ LAYERS = ("trace", "triads")
 
 
 def render_png(
-    plans: Shown,
+    plans: Replayable,
     file: str | os.PathLike[str],
     *,
     t: float,
@@ -76,7 +76,7 @@ def render_png(
 
 
 def render_gif(
-    plans: Shown,
+    plans: Replayable,
     file: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (640, 400),

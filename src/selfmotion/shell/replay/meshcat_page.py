@@ -10,7 +10,7 @@ from selfmotion.basics import ProblemError, as_path, shown as told, write_text
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.content import page_content
 from selfmotion.shell.replay.meshes import Payload
-from selfmotion.shell.replay.page import joined, policy, squeezed, web
+from selfmotion.shell.replay.page import asset, compressed, concatenated, content_security_policy
 from selfmotion.shell.replay.replayed import PlanReplay
 
 _VIEWER = "meshcat/viewer/dist/main.min.js"
@@ -38,11 +38,11 @@ def meshcat_html(plan: Plan, *, title: str | None = None) -> str:
     payload = Payload()
     replayed = PlanReplay(plan)
     content = page_content([replayed], ["plan"], payload, triads=replayed.triads)
-    code, script = _viewer_code(), joined(_SCRIPTS)
-    return Template(web("meshcat.html")).substitute(
-        policy=policy(script, code),
+    code, script = _viewer_code(), concatenated(_SCRIPTS)
+    return Template(asset("meshcat.html")).substitute(
+        policy=content_security_policy(script, code),
         title=html.escape(title or f"{plan.robot.name}, {plan.task.value} task"),
-        viewer=squeezed(code),
+        viewer=compressed(code),
         payload=payload.pack(content),
         script=script,
     )

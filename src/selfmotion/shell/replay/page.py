@@ -1,4 +1,4 @@
-"""One HTML file from one or several plans of a robot."""
+"""HTML replay page of plans of a robot, of a program, of parts or of a move."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from selfmotion.basics import (
     as_numbers,
     as_path,
     as_whole,
-    shown as told,
+    shown,
     write_text,
 )
 from selfmotion.planning.result import Move, Parts, Plan
@@ -34,16 +34,19 @@ from selfmotion.shell.replay.still import still
 from selfmotion.work.job import Program
 
 # What a page can show.
-Shown = Plan | Sequence[Plan] | Program | Parts | Move
-_MOST_TRIADS = 1000
-# three.js, as `make three` takes it from its own package; the page's own scripts.
+Replayable = Plan | Sequence[Plan] | Program | Parts | Move
+# Largest number of drawn tool frames.
+_MAX_TRIADS = 1000
+# three.js, as `make three` builds it.
 _THREE = "three/three.min.js"
+# Scripts of a page that a server changes; they run before the last of the others.
 _LIVE = ("handles.js", "live.js")
+# Scripts of the page, in the order in which they run.
 _SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "tools.js", "page.js")
 
 
 def replay_html(
-    plans: Shown,
+    plans: Replayable,
     *,
     title: str | None = None,
     labels: Sequence[str] | None = None,
@@ -83,43 +86,46 @@ def replay_html(
     )
     first, names = replayed[0], _labels(len(replayed), labels)
     payload = Payload()
-    axes = first.triads if triads is None else _checked(triads)
-    content = page_content(replayed, names, payload, triads=axes)
+    drawn_triads = first.triads if triads is None else _checked_triads(triads)
+    content = page_content(replayed, names, payload, triads=drawn_triads)
     if description is not None:
-        for shown_plan in content["plans"]:
-            shown_plan["description"] = description
+        described = [{**plan, "description": description} for plan in content["plans"]]
+        content = {**content, "plans": described}
     sentences = [item.description for item in replayed]
     if len(replayed) > 1:
-        sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
-    what = f"{first.plan.task.value} task"
+        sentences = [f"{name}: {text}." for name, text in zip(names, sentences, strict=True)]
+    subject = f"{first.plan.task.value} task"
     if isinstance(plans, Program | Parts | Move):
-        what = type(plans).__name__.lower()
-    heading = title or f"{first.plan.robot.name}, {what}"
-    picture = _still_of(first, content["camera"])
-    return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
+        subject = type(plans).__name__.lower()
+    return _assemble(
+        title or f"{first.plan.robot.name}, {subject}",
+        description or " ".join(sentences),
+        payload.pack(content),
+        _still_of(first, content["camera"]),
+    )
 
 
 def live_html(replayed: Replayed, *, title: str, live: Json) -> tuple[str, float]:
-    """Return the page of a plan that is changed while it is shown, and the scene's radius [m].
+    """Return the page of a plan that `shell.view` edits, and the radius of the scene [m].
 
-    It is that of `replay_html` with the modules that a server is asked by: see `shell.view`, which
-    says in `live` what they have to know.
+    It has the page of `replay_html` and scripts that query the server; `live` is their initial
+    state.
     """
     payload = Payload()
     content = page_content([replayed], ["plan"], payload, triads=replayed.triads, with_map=False)
     packed = payload.pack({**content, "live": live})
-    scripts = (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1])
-    picture = _still_of(replayed, content["camera"])
-    page = _assemble(title, replayed.description, packed, picture, scripts)
+    still_image = _still_of(replayed, content["camera"])
+    page = _assemble(title, replayed.description, packed, still_image, live=True)
     return page, float(content["radius"])
 
 
 def _still_of(replayed: Replayed, camera: Json) -> str:
+    """Return the image that the page shows until its scripts run."""
     plan = replayed.plan
     return still(plan.robot, plan.trajectory, replayed.obstacles, camera, replayed.seams())
 
 
-def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
+def write_replay(plans: Replayable, file: str | os.PathLike[str], **options: Any) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
     Returns
@@ -142,23 +148,23 @@ def notebook_html(plan: Plan, height: int = 900) -> str:
 
 
 def _as_list(plans: Any) -> list[Plan]:
-    shown = list(plans) if isinstance(plans, Sequence) else [plans]
-    if not shown:
+    plan_list = list(plans) if isinstance(plans, Sequence) else [plans]
+    if not plan_list:
         raise ProblemError("a replay needs at least one plan")
-    for plan in shown:
+    for plan in plan_list:
         if not isinstance(plan, Plan):
             raise ProblemError(
-                f"a replay is of {told(plan)}, expected plans, or one Program, Parts or Move"
+                f"a replay is of {shown(plan)}, expected plans, or one Program, Parts or Move"
             )
-    first = shown[0].robot
-    for plan in shown[1:]:
-        same = plan.robot.urdf.sha256 == first.urdf.sha256
-        if not same or plan.robot.joint_names != first.joint_names:
+    first = plan_list[0].robot
+    for plan in plan_list[1:]:
+        is_same_file = plan.robot.urdf.sha256 == first.urdf.sha256
+        if not is_same_file or plan.robot.joint_names != first.joint_names:
             raise ProblemError(
                 f"plans of different robots ('{first.name}' and '{plan.robot.name}') cannot share "
                 f"a replay; write one for each"
             )
-    return shown
+    return plan_list
 
 
 def _labels(count: int, labels: Sequence[str] | None) -> list[str]:
@@ -168,53 +174,50 @@ def _labels(count: int, labels: Sequence[str] | None) -> list[str]:
         raise ProblemError(f"{len(labels)} labels for {count} plans; give one for each")
     for label in labels:
         if not isinstance(label, str):
-            raise ProblemError(f"labels: {told(label)}, expected a text for each plan")
+            raise ProblemError(f"labels: {shown(label)}, expected a text for each plan")
     return list(labels)
 
 
-def _checked(triads: int | npt.ArrayLike) -> int | Array:
-    """Return a number of triads, or their times [s]."""
+def _checked_triads(triads: int | npt.ArrayLike) -> int | Array:
+    """Return the number of drawn tool frames, or their times [s]."""
     if isinstance(triads, int):
-        return as_whole(triads, "triads", 0, _MOST_TRIADS)
+        return as_whole(triads, "triads", 0, _MAX_TRIADS)
     return np.atleast_1d(as_numbers(triads, "triads", "how many, or times [s]"))
 
 
 def _assemble(
-    title: str,
-    description: str,
-    payload: str,
-    picture: str,
-    scripts: Sequence[str] = _SCRIPTS,
+    title: str, description: str, payload: str, still_image: str, *, live: bool = False
 ) -> str:
-    code, script = web(_THREE), joined(scripts)
-    live = scripts is not _SCRIPTS
-    return Template(web("page.html")).substitute(
-        policy=policy(script, code, live=live),
+    """Return the page; a `live` one has the scripts that query its server."""
+    scripts = (*_SCRIPTS[:-1], *_LIVE, _SCRIPTS[-1]) if live else _SCRIPTS
+    code, script = asset(_THREE), concatenated(scripts)
+    return Template(asset("page.html")).substitute(
+        policy=content_security_policy(script, code, live=live),
         title=html.escape(title),
         description=html.escape(description),
-        style=web("style.css"),
-        viewer=squeezed(code),
+        style=asset("style.css"),
+        viewer=compressed(code),
         payload=payload,
-        still=picture,
+        still=still_image,
         script=script,
     )
 
 
-def joined(names: Sequence[str]) -> str:
-    """Return scripts of the page as one."""
-    return "\n" + "\n".join(web(name) for name in names)
+def concatenated(names: Sequence[str]) -> str:
+    """Return the scripts, concatenated."""
+    return "\n" + "\n".join(asset(name) for name in names)
 
 
-def policy(*scripts: str, live: bool = False) -> str:
-    """Return what a page may load and run: these scripts, and nothing from outside.
+def content_security_policy(*scripts: str, live: bool = False) -> str:
+    """Return the Content-Security-Policy that allows only these scripts.
 
-    One that is `live` may ask the server that it came from.
+    A `live` page may connect to its server.
     """
     return "; ".join(
         [
             "default-src 'none'",
             f"script-src {' '.join(map(_hash, scripts))}",
-            # What moves is placed by its own style.
+            # Scripts position elements by inline styles.
             "style-src 'unsafe-inline'",
             "img-src data: blob:",
             *(["connect-src 'self'"] if live else []),
@@ -224,14 +227,14 @@ def policy(*scripts: str, live: bool = False) -> str:
     )
 
 
-def squeezed(code: str) -> str:
-    """Return a script as the page holds it, until it is run."""
+def compressed(code: str) -> str:
+    """Return a script, gzipped and in base64."""
     packed = base64.b64encode(gzip.compress(code.encode(), compresslevel=9, mtime=0))
     return packed.decode("ascii")
 
 
-def web(name: str) -> str:
-    """Return a file of the page by its name."""
+def asset(name: str) -> str:
+    """Return the text of a file of ``web/``."""
     file = resources.files("selfmotion.shell.replay").joinpath("web", *name.split("/"))
     return file.read_text(encoding="utf-8")
 

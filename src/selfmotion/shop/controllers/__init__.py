@@ -48,7 +48,7 @@ from selfmotion.shop.controllers.program_settings import (
     program_settings_of as program_settings_of,
     read_program_settings as read_program_settings,
 )
-from selfmotion.shop.controllers.program_steps import parts_of as parts_of
+from selfmotion.shop.controllers.program_steps import step_motions as step_motions
 from selfmotion.shop.controllers.samples import (
     LinearDeviation as LinearDeviation,
     coarsest_rate as coarsest_rate,
@@ -57,8 +57,8 @@ from selfmotion.shop.controllers.samples import (
     slowed_as as slowed_as,
     within_limits_at as within_limits_at,
 )
-from selfmotion.shop.controllers.thinning import (
+from selfmotion.shop.controllers.target_constraints import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,
 )
-from selfmotion.shop.controllers.work_objects import turned_base as turned_base
+from selfmotion.shop.controllers.work_objects import base_rotation_note as base_rotation_note

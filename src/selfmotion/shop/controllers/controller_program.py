@@ -13,24 +13,17 @@ from selfmotion.model.path import Path
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers.controller_axes import Axis
+from selfmotion.shop.controllers.deviations import NO_DEVIATION, Deviations, deviation_of
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.operations import operations_of
+from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
-from selfmotion.shop.controllers.segments import (
-    NO_DEVIATION,
-    Deviations,
-    Knots,
-    Segment,
-    by_interpolation,
-    deviation_of,
-)
-from selfmotion.shop.controllers.thinning import operations_of
+from selfmotion.shop.controllers.segments import Knots, Segment, by_interpolation
 from selfmotion.shop.controllers.work_objects import WORLD
 from selfmotion.work.job import Program
 
 # Largest distance of a first pose that was taught anew from the axis target before [rad or m].
 _MAX_START_GAP = 0.02
-# Remaining time of an operation that counts as none [s].
-_TIME_TOLERANCE = 1e-4
 
 
 class Switch(NamedTuple):
@@ -201,7 +194,7 @@ class ControllerProgram:
             )
             worst = worst.worse(both)
             elapsed += segment.duration
-            if elapsed >= operation.motion.duration - _TIME_TOLERANCE:
+            if elapsed >= operation.motion.duration - TIME_TOLERANCE:
                 elapsed, k = 0.0, k + 1
         if k > len(operations):
             raise FileFormatError("goes on when the motion has ended")

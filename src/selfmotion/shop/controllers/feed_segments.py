@@ -14,7 +14,8 @@ from selfmotion.basics import Array, FileFormatError
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, times_when
 from selfmotion.shop.controllers.arcs import put_on_arcs, step_lengths
-from selfmotion.shop.controllers.segments import Curve, Knots, PoseSegment, finer, straight
+from selfmotion.shop.controllers.pose_segments import PoseSegment, linear_poses
+from selfmotion.shop.controllers.segments import Curve, Knots, subdivided
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # Times at which speeds are evaluated, per interval between two samples.
@@ -225,7 +226,7 @@ class FeedSegment(PoseSegment):
     def evaluation_times(self) -> Array:
         # Steps may be as long as the segment.
         count = max(_OF_STEP, ceil(_LOOKS / (len(self.t) - 1)))
-        return finer(self.t, np.linspace(0.0, 1.0, count, endpoint=False))
+        return subdivided(self.t, np.linspace(0.0, 1.0, count, endpoint=False))
 
     @property
     @override
@@ -318,7 +319,7 @@ class FeedSegment(PoseSegment):
             yield Knots.smooth(times, self.joints(curve(own), own))
 
     def _stepped(self, times: Array) -> Array:
-        rows = straight(times, self.t, self.rows)
+        rows = linear_poses(times, self.t, self.rows)
         put_on_arcs(rows, times, self.t, self.positions, self.vias)
         return rows
 
@@ -332,7 +333,7 @@ class FeedSegment(PoseSegment):
         inside = np.searchsorted(edges, travel) % 2 == 1
         if inside.any():
             at_edges = self._stepped(np.interp(edges, self.lengths, self.t))
-            rows[inside] = straight(travel[inside], edges, at_edges)
+            rows[inside] = linear_poses(travel[inside], edges, at_edges)
         return rows
 
     def _travel(self, times: Array) -> Array:

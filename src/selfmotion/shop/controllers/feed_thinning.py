@@ -16,8 +16,11 @@ from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.arcs import arc_through, step_lengths
+from selfmotion.shop.controllers.deviations import SAMPLING_FACTOR, Deviation
 from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
+from selfmotion.shop.controllers.operations import Operation
 from selfmotion.shop.controllers.pose_numbers import Rounding
+from selfmotion.shop.controllers.pose_segments import aligned_quaternions
 from selfmotion.shop.controllers.pose_steps import (
     NoStepError,
     SampledPoses,
@@ -26,17 +29,9 @@ from selfmotion.shop.controllers.pose_steps import (
     StepTolerance,
 )
 from selfmotion.shop.controllers.program_texts import TIMES_HEADING
-from selfmotion.shop.controllers.segments import (
-    SAMPLING_FACTOR,
-    Deviation,
-    Event,
-    Knots,
-    Segment,
-    aligned_quaternions,
-    by_interpolation,
-)
+from selfmotion.shop.controllers.segments import Event, Knots, Segment, by_interpolation
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
-from selfmotion.shop.controllers.thinning import Operation, is_at_rest
+from selfmotion.shop.controllers.thinning import is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 from selfmotion.shop.controllers.work_objects import carrier_in_reference
 
@@ -163,7 +158,7 @@ class FeedSection(PoseSection):
             for own, each in zip(planned, zip(*rows, strict=True), strict=True)
         ]
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
-        return self.operation.keeps is not None and self.operation.keeps(judged, allowed)
+        return self.operation.is_valid is not None and self.operation.is_valid(judged, allowed)
 
     def _has_timely_events(self, segment: FeedSegment) -> bool:
         """Whether there is time for the ramps, and events are on time with even ramps."""
@@ -332,7 +327,7 @@ def paced_section(
 ) -> PoseSection:
     """Return the section of a seam at a feed; of other parts of a motion, one with times."""
     has_feed = len(operation.feeds) == 1 and bool(operation.feeds[0])
-    is_paced = has_feed and operation.keeps is not None and _rides_along(frames)
+    is_paced = has_feed and operation.is_valid is not None and _rides_along(frames)
     kind = FeedSection if is_paced else PoseSection
     return kind(operation, slides, first, last, frames, rounding)
 

@@ -19,18 +19,20 @@ from selfmotion.planning.result import CheckedMotion, Move, Plan, elsewhere, gap
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_draft import constraints_of
 from selfmotion.shop.controllers.program_facts import check_load
 from selfmotion.shop.controllers.program_files import program_deviation, read_program
-from selfmotion.shop.controllers.program_steps import ProgramParts, parts_of
+from selfmotion.shop.controllers.program_steps import StepMotions, step_motions
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.segments import PoseSegment
-from selfmotion.shop.controllers.thinning import constraints_of_lines, constraints_of_targets
+from selfmotion.shop.controllers.target_constraints import (
+    constraints_of_lines,
+    constraints_of_targets,
+)
 from selfmotion.shop.controllers.work_objects import WORLD, carrier_in_reference
 from selfmotion.work.job import Program, are_opposite
 
-# Rounding of times in files [s].
-_MOMENT = 1e-4
 # Rounding of angles in files [rad].
 _ANGLE_ROUNDING = 1e-6
 # Rounding of the ends of a program in joints [rad or m].
@@ -61,7 +63,7 @@ class JudgedStep(NamedTuple):
 
 
 def slow_steps(
-    parts: ProgramParts, job: Program
+    parts: StepMotions, job: Program
 ) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[CheckedMotion]]]:
     """Return failures of slow motions, and these motions by the step that they are before.
 
@@ -204,7 +206,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     """
     program = read_program(file, job.robot)
     allowed = within or stated_deviation(program)
-    parts = parts_of(file, program, job)
+    parts = step_motions(file, program, job)
     steps, checked = _judged_steps(job, parts.motions, allowed, constraints_of_targets, program)
     slow, between = slow_steps(parts, job)
     checked = [item for k, own in enumerate(checked) for item in (*between.get(k, ()), own)]
@@ -223,7 +225,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     return JudgedProgram((*steps, *slow), failures, allowed, shift_note(program), left)
 
 
-def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts) -> Iterator[str]:
+def _shifted_moves(program: ControllerProgram, job: Program, parts: StepMotions) -> Iterator[str]:
     """Yield what of a shifted program is elsewhere without the shift's doing.
 
     Moves by joint targets, which know no work object; and slow motions that go farther than from
@@ -262,7 +264,7 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
 
 
 def _off_moves(
-    file: FilePath, program: ControllerProgram, job: Program, parts: ProgramParts
+    file: FilePath, program: ControllerProgram, job: Program, parts: StepMotions
 ) -> Iterator[str]:
     """Yield by how much free moves leave those of the job, beyond what the file states."""
     if program.shift is not None:
@@ -370,7 +372,7 @@ def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
         It is of other joints.
     """
     whole = motion.of_joints(job.robot.joint_names)
-    if abs(whole.duration - job.duration) > _MOMENT:
+    if abs(whole.duration - job.duration) > TIME_TOLERANCE:
         failure = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
         return JudgedProgram((), (failure,))
     ends = [*job.begins, job.duration]

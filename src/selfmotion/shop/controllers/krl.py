@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.pose_numbers import krl_numbers, krl_pose
+from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, krl_numbers, krl_pose
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_writer import WrittenPose
@@ -21,7 +21,6 @@ from selfmotion.shop.controllers.statements import (
     truth,
     word,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
 # After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators
 # (KSS 8.3 SI V4): E6AXIS aggregates, ``PTP_SPLINE`` with ``SPTP`` segments and a ``TIME_BLOCK``,

@@ -10,12 +10,9 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_program import Switch
 from selfmotion.shop.controllers.krl import FASTEST, KRL, TURNING, UNBOUND_TURNING, WHOLE
+from selfmotion.shop.controllers.pose_segments import aligned_quaternions, largest_tool_speeds
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.segment_building import Pose, times_of
-from selfmotion.shop.controllers.segments import (
-    aligned_quaternions,
-    fastest_between,
-)
 
 # Difference of a block's time from the sum of its parts below which parts are seconds [s].
 _SAME_TIME = 1e-4
@@ -209,7 +206,7 @@ class KrlReader(ProgramReader):
         positions = np.array([pose.position for pose in poses])
         quaternions = aligned_quaternions(np.array([pose.quaternion for pose in poses]))
         times = times_of([target.seconds for target in self.run])
-        fast, turning = fastest_between(times, positions, quaternions)
+        fast, turning = largest_tool_speeds(times, positions, quaternions)
         speed = self.settings.get("speed", 0.0)
         least = min(self.settings.get(name, 0.0) for name in _TURNINGS)
         if fast > speed:

@@ -16,6 +16,7 @@ from selfmotion.shop.controllers.krl import (
     UNBOUND_TURNING,
     WHOLE,
 )
+from selfmotion.shop.controllers.pose_segments import PoseSegment, largest_tool_speeds, linear_poses
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_texts import module_name
 from selfmotion.shop.controllers.program_writer import (
@@ -23,12 +24,7 @@ from selfmotion.shop.controllers.program_writer import (
     goes_round,
     speeds_of,
 )
-from selfmotion.shop.controllers.segments import (
-    PoseSegment,
-    Segment,
-    fastest_between,
-    straight,
-)
+from selfmotion.shop.controllers.segments import Segment
 
 # Names that no module may have.
 # fmt: off
@@ -212,7 +208,7 @@ _AT_TARGET = TRIGGER.partition("$OUT")[0]
 
 def _unbound(segment: PoseSegment) -> float:
     """Return a speed above what the times of a segment need, if $VEL.CP can be it [m/s]."""
-    fast, _ = fastest_between(segment.t, segment.positions, segment.quaternions)
+    fast, _ = largest_tool_speeds(segment.t, segment.positions, segment.quaternions)
     return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_TIMES * fast) / 1e3), _MAX_SPEED))
 
 
@@ -222,7 +218,7 @@ def _is_straight(segment: PoseSegment) -> bool:
     length = np.linalg.norm(rows[:, :3] - rows[0, :3], axis=1)
     if length[-1] < _SHORT or (np.diff(length) <= 0.0).any():
         return False
-    line = straight(length, length[[0, -1]], rows[[0, -1]])
+    line = linear_poses(length, length[[0, -1]], rows[[0, -1]])
     return bool(np.abs(line - rows).max() < _ON_LINE)
 
 

@@ -7,6 +7,7 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel, Urdf
 from selfmotion.shop.controllers.program_texts import as_word
 
+# Joint types of the URDF with one coordinate.
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
 
@@ -14,15 +15,16 @@ def keyframes(robot: RobotModel, t: Array, q: Array, qd: Array) -> str:
     """Return an MJCF file with one ``<key>`` per sample, for ``<include file="…"/>``.
 
     ``qpos`` and ``qvel`` have all movable joints of the URDF in the order of MuJoCo's compiler
-    (depth first), those off the chain where the plan holds them: they fit a model that was made of
-    the same URDF.
+    (depth first). Joints off the chain have their locked positions. The file fits a model compiled
+    from the same URDF.
 
     Parameters
     ----------
     robot : RobotModel
     t : (K,)
-        [s]
+        Sample times [s].
     q, qd : (K, n)
+        Positions and velocities [rad or m, and per second].
 
     Raises
     ------
@@ -31,14 +33,14 @@ def keyframes(robot: RobotModel, t: Array, q: Array, qd: Array) -> str:
     """
     joints = list(_depth_first(robot.urdf))
     # Joints that mimic others are joints of their own here.
-    places, speeds = robot.all_joints(q), robot.all_joints_rates(qd)
+    positions, velocities = robot.all_joints(q), robot.all_joints_rates(qd)
     root = ElementTree.Element("mujoco")
     frame = ElementTree.SubElement(root, "keyframe")
     for k, time in enumerate(t.tolist()):
-        position = [places[j][k] if j in places else robot.locked[j] for j in joints]
-        speed = [speeds[j][k] if j in speeds else 0.0 for j in joints]
+        qpos = [positions[j][k] if j in positions else robot.locked[j] for j in joints]
+        qvel = [velocities[j][k] if j in velocities else 0.0 for j in joints]
         ElementTree.SubElement(
-            frame, "key", name=f"t{k}", time=repr(time), qpos=_text(position), qvel=_text(speed)
+            frame, "key", name=f"t{k}", time=repr(time), qpos=_text(qpos), qvel=_text(qvel)
         )
     ElementTree.indent(root)
     # A comment of XML has no two hyphens.
@@ -49,19 +51,19 @@ def keyframes(robot: RobotModel, t: Array, q: Array, qd: Array) -> str:
 
 def _depth_first(urdf: Urdf) -> Iterator[str]:
     """Yield the movable joints below the root, each branch to its end."""
-    children = {joint.child for joint in urdf.joints.values()}
-    pending = [link for link in urdf.links if link not in children]
+    by_child = {joint.child: joint for joint in urdf.joints.values()}
+    pending = [link for link in urdf.links if link not in by_child]
     while pending:
         link = pending.pop()
-        for joint in urdf.joints.values():
-            if joint.child == link and joint.kind in _MOVABLE:
-                yield joint.name
-            elif joint.child == link and joint.kind != "fixed":
-                raise ProblemError(
-                    f"{urdf.source}: joint '{joint.name}' is {joint.kind}, for which keyframes of "
-                    f"this arm have no coordinates; hold it fixed in the URDF"
-                )
-        below = [joint.child for joint in urdf.joints.values() if joint.parent == link]
+        joint = by_child.get(link)
+        if joint is not None and joint.kind in _MOVABLE:
+            yield joint.name
+        elif joint is not None and joint.kind != "fixed":
+            raise ProblemError(
+                f"{urdf.source}: joint '{joint.name}' is {joint.kind}, for which keyframes of "
+                f"this arm have no coordinates; hold it fixed in the URDF"
+            )
+        below = [item.child for item in urdf.joints.values() if item.parent == link]
         pending += reversed(below)
 
 

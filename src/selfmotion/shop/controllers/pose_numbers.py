@@ -1,4 +1,4 @@
-"""Tool poses in the numbers that each language has for them."""
+"""Tool poses in the numbers of each controller language, and the decimals of programs."""
 
 from collections.abc import Callable, Mapping
 
@@ -13,10 +13,14 @@ from selfmotion.model.task import Quaternion, exp3, log3, rpy
 
 # Positions (K, 3) [m] and quaternions (K, 4) as they are when a file is read again.
 Rounding = Callable[[Array, Array], tuple[Array, Array]]
-# Decimals of lengths in mm.
-_MM = 4
-# Decimals of angles in degrees.
-_DEGREES = 5
+# Decimals of times in programs [s].
+TIME_DIGITS = 5
+# Largest rounding of a duration that is a sum of times in a program [s].
+TIME_TOLERANCE = 1e-4
+# Decimals of lengths in programs [mm].
+LENGTH_DIGITS = 4
+# Decimals of angles in programs [°].
+ANGLE_DIGITS = 5
 # Decimals of parts of quaternions.
 _PARTS = 8
 # Decimals of lengths in m and angles in rad.
@@ -26,7 +30,7 @@ _SI = 9
 def krl_numbers(position: Array, quaternion: Array) -> list[float]:
     """Return X, Y, Z [mm], A, B, C [deg] of a pose."""
     c, b, a = np.degrees(rpy.matrixToRpy(_matrix(quaternion))).tolist()
-    return [*_rounded(1e3 * position, _MM), *_rounded([a, b, c], _DEGREES)]
+    return [*_rounded(1e3 * position, LENGTH_DIGITS), *_rounded([a, b, c], ANGLE_DIGITS)]
 
 
 def krl_pose(numbers: Array) -> tuple[Array, Array]:
@@ -38,7 +42,7 @@ def krl_pose(numbers: Array) -> tuple[Array, Array]:
 def rapid_numbers(position: Array, quaternion: Array) -> list[float]:
     """Return x, y, z [mm], q1, q2, q3, q4 of a pose."""
     x, y, z, w = (quaternion if quaternion[3] >= 0.0 else -quaternion).tolist()
-    return [*_rounded(1e3 * position, _MM), *_rounded([w, x, y, z], _PARTS)]
+    return [*_rounded(1e3 * position, LENGTH_DIGITS), *_rounded([w, x, y, z], _PARTS)]
 
 
 def rapid_pose(numbers: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.model.task import Task
 from selfmotion.shop.controllers.arcs import MIN_LENGTH, arc_through, put_on_arcs
-from selfmotion.shop.controllers.segments import straight
+from selfmotion.shop.controllers.pose_segments import linear_poses
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # Share of the tolerance that steps use; the rest is for blended corners and rounding.
@@ -232,7 +232,7 @@ class StepSearch:
         """Return the rows of one step at the samples between; None for what is no arc."""
         section, ends = slice(first, last + 1), [first, last]
         travel, rows = self.samples.travel, self.samples.rows
-        found = straight(travel[section], travel[ends], rows[ends])
+        found = linear_poses(travel[section], travel[ends], rows[ends])
         if is_circular:
             via = self.samples.middle(first, last)
             arc = arc_through(rows[first, :3], via, rows[last, :3])

@@ -11,7 +11,9 @@ from selfmotion.basics import FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_program import ControllerProgram
+from selfmotion.shop.controllers.deviations import NO_DEVIATION, Deviation, Deviations
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_facts import ProgramFacts, with_checksum
 from selfmotion.shop.controllers.program_lines import Lines
@@ -28,9 +30,8 @@ from selfmotion.shop.controllers.program_texts import (
     rounded_up,
 )
 from selfmotion.shop.controllers.segment_building import ProgramFrames, pose_of_values
-from selfmotion.shop.controllers.segments import NO_DEVIATION, Deviation, Deviations, Segment
+from selfmotion.shop.controllers.segments import Segment
 from selfmotion.shop.controllers.statements import Field, Statement, Table, seconds, word
-from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
 
 def _read_number(comments: Any, text: str) -> float:

@@ -16,20 +16,21 @@ from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.controller_axes import axes_of, in_order, tool_from_flange
 from selfmotion.shop.controllers.controller_program import ControllerProgram
+from selfmotion.shop.controllers.deviations import Deviations
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.feed_thinning import paced_section
+from selfmotion.shop.controllers.operations import Operation, operations_of
 from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load
 from selfmotion.shop.controllers.program_settings import OF_PATH, ProgramSettings, Signal
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.segments import Deviations
 from selfmotion.shop.controllers.targets import (
     NotByPosesError,
     PosedSections,
     PoseSection,
     segments_of,
 )
-from selfmotion.shop.controllers.thinning import Operation, Section, operations_of
+from selfmotion.shop.controllers.thinning import Section
 from selfmotion.shop.controllers.tool_frames import ToolFrames, axis_inside_arm
 from selfmotion.shop.controllers.work_objects import frame_of_paths
 from selfmotion.work.job import Program, are_opposite

@@ -8,6 +8,7 @@ from selfmotion.basics import FileFormatError, Progress, silent
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers.controller_program import ControllerProgram
+from selfmotion.shop.controllers.deviations import Deviations
 from selfmotion.shop.controllers.krl_reader import KrlReader
 from selfmotion.shop.controllers.krl_writer import write_krl
 from selfmotion.shop.controllers.program_draft import Draft, Joints, drafted
@@ -15,7 +16,6 @@ from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.rapid_reader import RapidReader
 from selfmotion.shop.controllers.rapid_writer import write_rapid
-from selfmotion.shop.controllers.segments import Deviations
 from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.work.job import Program
 

@@ -11,11 +11,12 @@ from selfmotion.basics import Array, ProblemError, write_text
 from selfmotion.shop.controllers.controller_axes import written
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_comments import before, head
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_settings import Signal
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.segments import Segment
 from selfmotion.shop.controllers.statements import Language
 
 

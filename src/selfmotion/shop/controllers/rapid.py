@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.pose_numbers import rapid_numbers, rapid_pose
+from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, rapid_numbers, rapid_pose
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_writer import WrittenPose
@@ -21,7 +21,6 @@ from selfmotion.shop.controllers.statements import (
     truth,
     word,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
 # After ABB's Technical reference manual, RAPID Instructions, Functions and Data types (RobotWare
 # 6, 3HAC050917-001): ``MoveAbsJ`` of a ``jointtarget``, whose external axes are 9E9 where there

@@ -9,6 +9,7 @@ from typing_extensions import override
 from selfmotion.basics import ProblemError
 from selfmotion.shop.controllers.configurations import confdata
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_texts import module_name
 from selfmotion.shop.controllers.program_writer import (
@@ -18,7 +19,7 @@ from selfmotion.shop.controllers.program_writer import (
     speeds_of,
 )
 from selfmotion.shop.controllers.rapid import APPROACH_TURNING, FASTEST, NAME, RAPID, SLOW, TURNING
-from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.segments import Segment
 
 # Names that no module may have.
 # fmt: off

@@ -11,14 +11,9 @@ from selfmotion.model.task import SE3, Quaternion
 from selfmotion.shop.controllers.arcs import put_on_arcs
 from selfmotion.shop.controllers.controller_axes import Axis, tool_from_flange
 from selfmotion.shop.controllers.feed_segments import FeedSegment, times_at
+from selfmotion.shop.controllers.pose_segments import PoseSegment, aligned_quaternions, linear_poses
 from selfmotion.shop.controllers.program_settings import ProgramSettings
-from selfmotion.shop.controllers.segments import (
-    PoseSegment,
-    Segment,
-    aligned_quaternions,
-    finer,
-    straight,
-)
+from selfmotion.shop.controllers.segments import Segment, subdivided
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # Name in messages of inserted slow motions between the segments of a shifted program.
@@ -277,8 +272,8 @@ class SegmentBuilder:
         external = external[:, columns]
         # A step at a speed may be the whole segment.
         count = _SAMPLES * (_SAMPLES_AT_SPEED if at_speeds else 1)
-        times = finer(t, np.linspace(0.0, 1.0, count, endpoint=False))
-        rows = straight(times, t, np.hstack([positions, quaternions, external]))
+        times = subdivided(t, np.linspace(0.0, 1.0, count, endpoint=False))
+        rows = linear_poses(times, t, np.hstack([positions, quaternions, external]))
         if at_speeds:
             put_on_arcs(rows, times, t, positions, row.vias)
         if self.at is None:

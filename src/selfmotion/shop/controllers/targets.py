@@ -11,19 +11,17 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.shop.controllers.pose_numbers import Rounding
-from selfmotion.shop.controllers.segments import (
+from selfmotion.shop.controllers.deviations import (
     NO_DEVIATION,
     SAMPLING_FACTOR,
     Deviation,
     Deviations,
-    Event,
-    PoseSegment,
-    Segment,
-    aligned_quaternions,
-    finer,
 )
-from selfmotion.shop.controllers.thinning import Operation, Section, is_at_rest
+from selfmotion.shop.controllers.operations import Operation
+from selfmotion.shop.controllers.pose_numbers import Rounding
+from selfmotion.shop.controllers.pose_segments import PoseSegment, aligned_quaternions
+from selfmotion.shop.controllers.segments import Event, Segment, subdivided
+from selfmotion.shop.controllers.thinning import Section, is_at_rest
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # As few tool poses as keep a controller near a motion.
@@ -69,7 +67,7 @@ class PoseSection(Section):
     rounding: Rounding
 
     min_density: ClassVar[float] = 0.02
-    fewest: ClassVar[int] = 2
+    min_targets: ClassVar[int] = 2
 
     @override
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Deviation]]:
@@ -90,7 +88,7 @@ class PoseSection(Section):
             return
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         marks = np.concatenate([[self.first], inside, [self.last]])
-        t = finer(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
+        t = subdivided(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
         far = _OF_POSES / np.maximum(self.frames.smallest_singular_values(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
             at = float(t[int(far.argmax())] - motion.t[0])
@@ -326,10 +324,10 @@ def _allowed(operation: Operation, allowed: Tolerance, of_moves: Tolerance | Non
     """Return how far a controller may be off an operation."""
     if not operation.is_move:
         return allowed
-    if of_moves is not None or operation.room is None:
+    limit = operation.deviation_limit
+    if of_moves is not None or limit is None:
         return of_moves or allowed
-    room = operation.room
-    return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
+    return Tolerance(max(allowed.position, limit.position), max(allowed.rotation, limit.rotation))
 
 
 def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:

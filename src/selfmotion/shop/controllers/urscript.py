@@ -13,14 +13,15 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
-from selfmotion.shop.controllers.pose_numbers import urscript_numbers, urscript_pose
+from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, urscript_numbers, urscript_pose
+from selfmotion.shop.controllers.pose_segments import PoseSegment
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings
 from selfmotion.shop.controllers.program_texts import pose_values
 from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
 from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
-from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.segments import Segment
 from selfmotion.shop.controllers.statements import (
     Field,
     Language,
@@ -30,7 +31,6 @@ from selfmotion.shop.controllers.statements import (
     truth,
     word,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
 # After Universal Robots' script manual (e-Series, 5.11): ``movel`` goes straight to a pose, given
 # as position [m] and rotation vector [rad] in the base's frame, in the time t [s] where that is

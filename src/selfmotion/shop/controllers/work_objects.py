@@ -1,4 +1,4 @@
-"""Work objects: the frames that controllers express tool poses in, and the links they ride on."""
+"""Work objects: the frames of a program's tool poses, and the links that carry them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from selfmotion.shop.controllers.program_settings import OF_PATH
 WORLD = "world"
 # Smallest angle between frames above rounding [rad].
 _ANGLE_TOLERANCE = 1e-6
-# Largest difference of equal frames [m, parts of quaternions].
+# Largest difference between entries of equal frames [m, 1].
 _FRAME_TOLERANCE = 1e-9
 # Distance of a work object that must be in another unit, as a multiple of the arm's reach.
 _FAR_IN_REACHES = 20.0
@@ -31,6 +31,7 @@ class WorkObject(NamedTuple):
     pose : SE3
         In its carrier.
     name : str
+        Name of the link, ``path``, or ``given`` for a pose that the settings give.
     """
 
     carrier: str
@@ -41,44 +42,44 @@ class WorkObject(NamedTuple):
     def of(
         cls, robot: RobotModel, setting: SE3 | str | None, path_frame: SE3 | None = None
     ) -> "WorkObject":
-        """Return what `ProgramSettings.work_object` names.
+        """Return the work object that `ProgramSettings.work_object` names.
 
-        A link that no joint moves is as good as the controller's base, in which the work object
-        then is; one that an axis moves carries it. `path_frame` is the pose of the path's frame in
-        its carrier link, for a work object that is the frame of the path.
+        A link that no joint moves is expressed in the controller's base; a link that an axis moves
+        carries its work object. `path_frame` is the pose of the path's frame in its link, for a
+        work object at the path's frame.
 
         Raises
         ------
         ProblemError
-            The work object rides on what carries the tool, or there is no such link.
+            The work object is carried by a joint that moves the tool, or there is no such link.
         """
         base = base_of(robot)
         if isinstance(setting, SE3):
             _check_near(robot, setting)
             return cls(base, SE3(setting), "given")
-        inside = SE3.Identity()
+        pose_in_link = SE3.Identity()
         if setting is None:
             if robot.reference is None:
-                return cls(base, inside, base)
+                return cls(base, pose_in_link, base)
             link = name = robot.reference
         elif setting == OF_PATH:
             link, name = robot.reference or robot.urdf.root, OF_PATH
-            inside = path_frame or inside
+            pose_in_link = path_frame or pose_in_link
         else:
             link = name = setting
             _check_link(robot, link)
         if robot.carrier_of(link)[0] == 0:
-            to_link = robot.chain_to(link, None if base == WORLD else base)
-            return cls(base, to_link.place(np.zeros(robot.dof)) * inside, name)
+            base_to_link = robot.chain_to(link, None if base == WORLD else base)
+            return cls(base, base_to_link.place(np.zeros(robot.dof)) * pose_in_link, name)
         _check_not_on_tool(robot, link)
-        return cls(link, inside, name)
+        return cls(link, pose_in_link, name)
 
 
 def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
     """Return the pose of a work object's carrier in the frame of paths; None if it moves."""
     link = robot.urdf.root if carrier == WORLD else carrier
-    between = robot.chain_to(link, robot.reference)
-    return None if len(between.joints) else between.place(np.zeros(robot.dof))
+    chain = robot.chain_to(link, robot.reference)
+    return None if len(chain.joints) else chain.place(np.zeros(robot.dof))
 
 
 def base_of(robot: RobotModel) -> str:
@@ -88,12 +89,12 @@ def base_of(robot: RobotModel) -> str:
     """
     part = robot.tool.rpartition("/")[0]
     link = f"{part}/base" if part else "base"
-    known = link in robot.urdf.links and robot.carrier_of(link)[0] == 0
-    return link if known else WORLD
+    is_fixed_link = link in robot.urdf.links and robot.carrier_of(link)[0] == 0
+    return link if is_fixed_link else WORLD
 
 
-def turned_base(robot: RobotModel) -> str:
-    """Return how the controller's base is rotated from the root, in words; "" if it is not."""
+def base_rotation_note(robot: RobotModel) -> str:
+    """Return a note if the controller's base is rotated from the robot's root; else ""."""
     base = base_of(robot)
     if base == WORLD:
         return ""
@@ -102,21 +103,21 @@ def turned_base(robot: RobotModel) -> str:
     if angle < _ANGLE_TOLERANCE:
         return ""
     return (
-        f"work objects are counted in '{base}', the controller's frame, which is turned by "
-        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', in which --frame counts; work_object "
+        f"work objects are given in '{base}', the controller's frame, which is rotated by "
+        f"{np.degrees(angle):.4g}° from '{robot.urdf.root}', the frame of --frame; work_object "
         f"{OF_PATH} is the frame of the path"
     )
 
 
 def frame_of_paths(paths: Sequence[Path]) -> SE3:
-    """Return the frame that paths are given in, in the link that they ride on.
+    """Return the frame that paths are given in, in the link that carries them.
 
     Raises
     ------
     ProblemError
         They are given in several frames.
     """
-    frames = [_placed(path) for path in paths] or [SE3.Identity()]
+    frames = [_frame_of(path) for path in paths] or [SE3.Identity()]
     for frame in frames[1:]:
         if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _FRAME_TOLERANCE:
             raise ProblemError(
@@ -126,22 +127,22 @@ def frame_of_paths(paths: Sequence[Path]) -> SE3:
     return frames[0]
 
 
-def _placed(path: Path) -> SE3:
-    """Return the frame that a path is given in, through all paths that are made of another one."""
+def _frame_of(path: Path) -> SE3:
+    """Return the frame that a path is given in, looking through derived paths."""
     if isinstance(path, Placed):
-        return path.frame * _placed(path.original)
+        return path.frame * _frame_of(path.original)
     if isinstance(path, Joined):
         return frame_of_paths(path.pieces)
-    inner = getattr(path, "original", None)
-    return SE3.Identity() if inner is None else _placed(inner)
+    original = getattr(path, "original", None)
+    return SE3.Identity() if original is None else _frame_of(original)
 
 
 def _check_near(robot: RobotModel, work: SE3) -> None:
     """Raise ProblemError for a work object that the arm is far from reaching."""
-    far = float(np.linalg.norm(work.translation))
-    if far > _FAR_IN_REACHES * robot.reach:
+    distance = float(np.linalg.norm(work.translation))
+    if distance > _FAR_IN_REACHES * robot.reach:
         raise ProblemError(
-            f"{robot.name}: the work object is {far:.4g} m away, but the arm reaches "
+            f"{robot.name}: the work object is {distance:.4g} m away, but the arm reaches "
             f"{robot.reach:.3g} m; in millimetres? It is in m (position_mm in files)"
         )
 
@@ -156,7 +157,7 @@ def _check_link(robot: RobotModel, link: str) -> None:
 
 
 def _check_not_on_tool(robot: RobotModel, link: str) -> None:
-    """Refuse a link that moves with the arm, or with what carries it."""
+    """Raise ProblemError for a link that a joint of the tool's chain moves."""
     shared = {*robot.chain_to(link).joints} & {*robot.chain_to(robot.tool).joints}
     if shared:
         joint = robot.joint_names[min(shared)]
