@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import selfmotion as sm
-from selfmotion.shell.cli.runs import panda_past_a_box
+from selfmotion.shell.cli.project_commands import panda_past_a_box
 from selfmotion.shell.replay import render_png
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

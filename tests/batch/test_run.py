@@ -19,7 +19,7 @@ import pytest
 import trimesh
 
 import selfmotion as sm
-from selfmotion.shell.cli.runs import is_answered
+from selfmotion.shell.cli.batch_command import is_answered
 from selfmotion.shell.documents import grid_items, write_combination
 from selfmotion.work.batch import BatchProgress, Item, plan_items, run
 from support.arms import PANDA_HOME, robot_named

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.shell.cli import runs
+from selfmotion.shell.cli import follow_command, outputs
 from selfmotion.shell.cli.following import out_of_reach, replanner_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
@@ -113,7 +113,7 @@ def test_states_of_a_wrong_length_are_told_with_the_right_one(
     file, port = written(tmp_path), free_port()
     controller = Controller(port, steps=20)
     told: list[str] = []
-    monkeypatch.setattr(runs, "_print_note", told.append)
+    monkeypatch.setattr(follow_command, "_print_line", told.append)
     controller.start()
     code, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}")
     controller.join(10.0)
@@ -132,12 +132,12 @@ def test_a_path_that_leaves_the_reach_is_told_before_the_arm_moves(
     assert out_of_reach(sm.read_problem(file)) == ""
     file.write_text(file.read_text().replace("radius = 0.05", "radius = 0.9"))
     file.write_text("goal = 'fastest'\nmax_evaluations = 9\n" + file.read_text())
-    monkeypatch.setattr(runs, "_print_note", told.append)
+    monkeypatch.setattr(outputs, "print_notes", told.extend)
     # An address that is none ends it before anything moves.
     assert "expected host:port" in complaint("follow", file, "--listen", "nowhere")
     left, note = told
     assert left.endswith("goal, max_evaluations: of plans, and left out while the arm moves")
-    assert re.match(r"note: from t = [0-9.]+ s on the pose is out of reach", note)
+    assert re.match(r"from t = [0-9.]+ s on the pose is out of reach", note)
 
 
 def test_when_the_tool_was_off_its_path_is_told(tmp_path: Path) -> None:

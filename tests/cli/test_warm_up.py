@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from selfmotion.realtime import warm
-from selfmotion.shell.cli import runs
+from selfmotion.shell.cli import project_commands
 from support.shell import invoke
 
 
@@ -35,8 +35,8 @@ def test_each_work_is_done_and_what_was_compiled_is_said(
     names = [name for name, _ in warm.small_works()]
     assert len(set(names)) == len(names)
     works = [(name, lambda name=name: done.append(name)) for name in names]
-    monkeypatch.setattr(runs, "small_works", lambda: iter(works))
-    monkeypatch.setattr(runs, "compile_in_background", lambda _: other)
+    monkeypatch.setattr(project_commands, "small_works", lambda: iter(works))
+    monkeypatch.setattr(project_commands, "compile_in_background", lambda _: other)
     code, printed = invoke("warm-up")
     assert code == 0
     assert done == names

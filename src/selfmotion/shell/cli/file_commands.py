@@ -1,4 +1,4 @@
-"""The commands `init` and `schema`."""
+"""The commands to begin with: `init`, `schema` and `robots`."""
 
 import json
 import os
@@ -9,8 +9,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion.basics import write_text
-from selfmotion.shell.cli import documents, options, outputs
-from selfmotion.shell.cli.app import FILES, app, print_written
+from selfmotion.shell.cli import documents, options, outputs, result_json, tables
+from selfmotion.shell.cli.app import FILES, app, print_json, print_written, terminal
 from selfmotion.shell.documents import MAYBE, example_texts, json_schema
 
 # Keys that --set of `init` accepts.
@@ -86,3 +86,13 @@ def schema(out: options.OneOutOption = None) -> None:
         return
     write_text(out, text + "\n")
     print_written([out])
+
+
+@app.command(epilog="Example: selfmotion robots", rich_help_panel=FILES)
+def robots(as_json: options.JsonOption = False) -> None:
+    """List the arms known by name: joints, tool frame, and redundancy for each task."""
+    arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
+    if as_json:
+        print_json(result_json.robots_json(arms))
+    else:
+        tables.show_robots(arms, terminal)
