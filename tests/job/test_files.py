@@ -13,7 +13,7 @@ from selfmotion.model.task import SE3
 from selfmotion.planning.transfer import FreeMotions, free_motion
 from selfmotion.work.job import work
 from selfmotion.work.job.earlier_program import EarlierProgram
-from selfmotion.work.job.files import ResultCache
+from selfmotion.work.job.result_cache import ResultCache
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -156,7 +156,7 @@ def test_what_is_kept_is_given_up_only_where_no_program_comes_of_it(program, mon
         return between(self, first, last, seconds, known)
 
     monkeypatch.setattr(FreeMotions, "between", to_no_kept_start)
-    monkeypatch.setattr(work, "satisfies", lambda *_: False)
+    monkeypatch.setattr(work, "serves", lambda *_: False)
     again = planned_again(program, seams()).require()
     turned = {step.name: step.turned for step in program.steps}
     for step in again.steps:

@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3
 from selfmotion.work.job import Step, backwards
-from selfmotion.work.job.files import ResultCache
+from selfmotion.work.job.result_cache import ResultCache
 from selfmotion.work.job.seam import backwards_plan
 from support.arms import robot_named
 

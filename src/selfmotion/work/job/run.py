@@ -47,10 +47,10 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.problem import KEPT, check_all_times, check_feeds, envelope_without_arm
 from selfmotion.work.job.earlier_program import EarlierProgram, check_earlier
-from selfmotion.work.job.files import ResultCache
 from selfmotion.work.job.ordering import Ordering
 from selfmotion.work.job.program import Program
 from selfmotion.work.job.program_builder import Builder
+from selfmotion.work.job.result_cache import ResultCache
 from selfmotion.work.job.seam import Seam
 from selfmotion.work.job.specification import Specification
 from selfmotion.work.job.work import JobSettings, Work, check_can_be_sent

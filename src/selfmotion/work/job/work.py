@@ -46,7 +46,7 @@ from selfmotion.problem.problem import (
     problem_to_dict,
 )
 from selfmotion.work.job.earlier_program import EarlierProgram, adapted_waypoints
-from selfmotion.work.job.files import ResultCache, satisfies
+from selfmotion.work.job.result_cache import ResultCache, serves
 from selfmotion.work.job.seam import Seam, backwards
 from selfmotion.work.job.step import Step
 
@@ -254,7 +254,7 @@ class Work:
             # Judged by the present constraints: files of bodies may have changed.
             arm, constraints = missing.robot, missing.constraints
             again = None if known is None else replace(known, robot=arm, constraints=constraints)
-            same = again is not None and satisfies(again, missing, task["ends"])
+            same = again is not None and serves(again, missing, task["ends"])
             stored.append(again if same else cache.move(file, missing, task["ends"]))
         return self._results_of("move", "move", tasks, files, stored, cache.store_move)
 

@@ -1,8 +1,7 @@
-"""Files of a job: saved programs, and results so far."""
+"""Results of a job so far: plans and moves kept in a folder while it is planned."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import asdict, replace
@@ -15,11 +14,9 @@ from selfmotion.basics import (
     Array,
     FileFormatError,
     SelfmotionError,
-    as_path,
     digest_of_file,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.model.collision import obstacle_from_dict
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import (
     Move,
@@ -30,60 +27,14 @@ from selfmotion.planning.result import (
     load_move,
     load_plan,
     not_judged_by,
-    read_bundle,
     read_kept,
     write_kept,
 )
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
-from selfmotion.work.job.program import Program
-from selfmotion.work.job.program_files import FORMAT
-from selfmotion.work.job.specification import Specification
-from selfmotion.work.job.step import Step
 
 # Rounding of the end of a move [rad or m].
 _JOINED = 1e-9
-
-
-def load_program(file: str | Path) -> Program:
-    """Read a program that `Program.save` wrote, and judge all of it anew.
-
-    A file that was changed is never verified.
-
-    Raises
-    ------
-    FileFormatError
-        The file is missing, is no program, lacks something, or was written by another version.
-    """
-    path = as_path(file)
-    description, made, changed = read_bundle(path, "program", FORMAT)
-    try:
-        pairs = zip(description["steps"], made, strict=True)
-        steps = tuple(_step(values, item) for values, item in pairs)
-        missing = {str(name): str(why) for name, why in description["missing"].items()}
-        notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
-        unjudged = tuple(map(str, description.get("unjudged", ())))
-        values = description["specification"]
-        robot = made[0].robot
-        specification = None if values is None else Specification.from_dict(values, robot)
-        if not math.isfinite(bound):
-            raise ValueError(f"bound is {bound}, not finite")
-    except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
-    if changed:
-        missing[path.name] = "the file was changed after the program was written"
-    return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged=unjudged)
-
-
-def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
-    return Step(
-        str(values["name"]),
-        made,
-        bool(values["turned"]),
-        tuple((str(name), float(at)) for name, at in values["events"]),
-        tuple(obstacle_from_dict(item) for item in values["leaves"]),
-        tuple(map(str, values["may_meet"])),
-    )
 
 
 class ResultCache:
@@ -99,8 +50,8 @@ class ResultCache:
         None stores nothing.
     tolerance : Tolerance
         Largest deviation of a seam from its path.
-    known : mapping
-        Arms and constraints that are loaded already; see `load_plan`.
+    arms : mutable mapping
+        Arms that are loaded already, shared by all files; `known` of `load_plan`.
     """
 
     def __init__(
@@ -135,15 +86,16 @@ class ResultCache:
         return files_of(robot, constraints, self._arms)
 
     def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
-        """Return the stored plans of a problem, and why there are none.
+        """Return the stored plans of a problem, or no plan and the reason why there is none.
 
-        None where nothing is stored.
+        None where nothing is stored, or what is stored does not hold any more.
         """
-        stored = None if file is None else read_kept(file)
-        if file is None or stored is None:
+        record = _record(file)
+        if record is None:
             return None
+        file, stored = record
         try:
-            files = _stored_archives(stored, file)
+            files = _checked_archives(stored, file)
             plans, reason = [self._plan(name) for name in files], str(stored["reason"])
             # Each has its own start.
             problems = [replace(plan.problem, start=problem.start) for plan in plans]
@@ -164,64 +116,71 @@ class ResultCache:
         if file is None:
             return
         plans, reason = result
-        for plan, archive in zip(plans, _archives(file, len(plans)), strict=True):
+        for plan, archive in zip(plans, _archive_names(file, len(plans)), strict=True):
             plan.save(archive)
         _write(file, len(plans), {"reason": reason})
 
-    def move(self, file: Path | None, missing: Move, ends: Array) -> Move | None:
-        """Return the stored move between ends (2, n), or `missing` with the reason.
+    def move(self, file: Path | None, wanted: Move, ends: Array) -> Move | None:
+        """Return the stored move between ends (2, n), or `wanted` with the reason for none.
 
-        None where nothing is stored.
+        None where nothing is stored, or what is stored does not hold any more.
         """
-        stored = None if file is None else read_kept(file)
-        if file is None or stored is None:
+        record = _record(file)
+        if record is None:
             return None
+        file, stored = record
         try:
             if stored["trouble"]:
-                return replace(missing, reason=str(stored["trouble"]))
-            (archive,) = _stored_archives(stored, file)
+                return replace(wanted, reason=str(stored["trouble"]))
+            (archive,) = _checked_archives(stored, file)
             move = load_move(archive, known=self._arms)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
-        return move if satisfies(move, missing, ends) else None
+        return move if serves(move, wanted, ends) else None
 
     def store_move(self, file: Path | None, move: Move) -> None:
         """Store a move, or why there is none."""
         if file is None:
             return
         count = int(move.trajectory is not None)
-        for archive in _archives(file, count):
+        for archive in _archive_names(file, count):
             move.save(archive)
         _write(file, count, {"trouble": "" if count else move.trouble})
 
 
-def satisfies(move: Move, missing: Move, ends: Array) -> bool:
-    """Whether a move is verified for the arm, constraints and ends (2, n) of a `missing` one."""
-    if move.trajectory is None or any(another_tool(move.robot, missing.robot)):
+def serves(move: Move, wanted: Move, ends: Array) -> bool:
+    """Whether a verified move joins ends (2, n), for arm and constraints of a `wanted` one."""
+    if move.trajectory is None or any(another_tool(move.robot, wanted.robot)):
         return False
     if float(np.abs(move.motion.q[[0, -1]] - ends).max()) > _JOINED:
         return False
-    return move.verified and not any(not_judged_by(move.constraints, missing.constraints))
+    return move.verified and not any(not_judged_by(move.constraints, wanted.constraints))
 
 
-def _archives(file: Path, count: int) -> list[Path]:
+def _record(file: Path | None) -> tuple[Path, Mapping[str, Any]] | None:
+    """Return the file of a task and what it says; None where nothing is stored."""
+    stored = None if file is None else read_kept(file)
+    return None if file is None or stored is None else (file, stored)
+
+
+def _archive_names(file: Path, count: int) -> list[Path]:
     """Return the files of the plans or moves of one task."""
     return [file.with_suffix(f".{number}.npz") for number in range(count)]
 
 
 def _write(file: Path, count: int, values: Mapping[str, Any]) -> None:
     """Write the record of a result, last, with the digest of each of its archives."""
-    digests = [digest_of_file(archive) for archive in _archives(file, count)]
+    digests = [digest_of_file(archive) for archive in _archive_names(file, count)]
     write_kept(file, {"digests": digests, **values})
 
 
-def _stored_archives(stored: Mapping[str, Any], file: Path) -> list[Path]:
+def _checked_archives(stored: Mapping[str, Any], file: Path) -> list[Path]:
     """Return the archives that were written with a record.
 
-    An archive of another task has a sound motion as well, and may be of the same problem.
+    Digests are compared: an archive that was exchanged for another one would be sound as well.
     """
     digests = list(stored["digests"])
-    archives = _archives(file, len(digests))
+    archives = _archive_names(file, len(digests))
     for archive, digest in zip(archives, digests, strict=True):
         if digest_of_file(archive) != digest:
             raise FileFormatError(f"{archive}: is not the one that was written with {file.name}")
