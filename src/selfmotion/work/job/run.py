@@ -1,4 +1,4 @@
-"""From seams to a program."""
+"""`plan_job`: seams become one program, in the best order and directions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -164,40 +163,46 @@ def plan_job(
     )
     check_executor(executor)
     clock = Deadline.after(deadline)
-    told = clock.checked_by(obeying(progress))
+    reported = clock.checked_by(obeying(progress))
     _check_seams(settings, listed, sent=folder is not None or executor is not None)
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
-    price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
+    weight = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
     _check_ends(settings, ends)
     # Processes and schedulers wait for Ctrl-C themselves.
-    held = nullcontext() if executor is not None else held_interruption()
-    with held:
+    with nullcontext() if executor is not None else held_interruption():
         cache = ResultCache(None if folder is None else as_path(folder), Tolerance(), {})
-        kept = {"constraints": settings.constraints, "clearances": settings.clearances}
-        specification = _specification(listed, not is_free, ends, arm=arm_digest(robot), **kept)
-        make = partial(Work, settings, cache, executor, told)
+        specification = Specification(
+            listed,
+            not is_free,
+            start=ends[0],
+            end=ends[1],
+            constraints=settings.constraints,
+            clearances=settings.clearances,
+            arm=arm_digest(robot),
+        )
+        work_like = partial(Work, settings, cache, executor, reported)
         try:
-            return _program(specification, make, ends, price, warm_start)
+            return _program(specification, work_like, ends, weight, warm_start)
         except KeyboardInterrupt:
             if not clock.passed:
                 raise
-            on = "give a folder= to go on from there" if folder is None else f"'{folder}' keeps it"
+            hint = (
+                "give a folder= to keep what is planned"
+                if folder is None
+                else f"what was planned by then is in '{folder}'"
+            )
             raise DeadlineError(
-                f"{robot.name}: the deadline of {deadline} s came before there was a program; of "
-                f"what was planned by then {on}: plan again, or allow more time"
+                f"{robot.name}: the deadline of {deadline} s came before there was a program; "
+                f"{hint}: plan again, or allow more time"
             ) from None
 
 
-def _specification(
-    seams: tuple[Seam, ...], in_order: bool, ends: Sequence[Array | None], **given: Any
-) -> Specification:
-    start, end = ends
-    return Specification(seams, in_order, start, end, **given)
-
-
 def _check_seams(settings: JobSettings, seams: Sequence[Seam], *, sent: bool) -> None:
-    """Raise an error where a seam's feed, the slowest one's, is none; or it cannot be `sent`."""
+    """Raise FeedError for the slowest seam whose path cannot have its feed.
+
+    Where seams are `sent` to other processes, raise ProblemError for a cost that cannot be.
+    """
     for seam in sorted(seams, key=_slowest):
         kept = envelope_without_arm(settings.robot, [*settings.constraints, *seam.constraints])
         check_feeds(f"seam '{seam.name}'", [seam.path], kept.tool_speed)
@@ -216,48 +221,74 @@ def _check_ends(settings: JobSettings, ends: Sequence[Array | None]) -> None:
 
 def _program(
     specification: Specification,
-    make: Callable[..., Work],
+    work_like: Callable[..., Work],
     ends: tuple[Array | None, ...],
-    price: float,
+    weight: float,
     warm_start: Program | None,
 ) -> Program:
     """Return the program of a job: first with the unchanged motions of an earlier one, if any.
 
-    `make` returns the `Work` that plans seams and moves, given the earlier program.
+    `work_like` returns the `Work` that plans seams and moves, given the earlier program; `weight`
+    is that of a seam's cost against time [s].
     """
-    listed, is_free = specification.seams, not specification.in_order
-    earlier, changed, why = None, dict[str, str](), ""
-    work = make()
-    robot = work.settings.robot
-    if warm_start is not None:
-        check_earlier(warm_start, robot)
-        earlier = EarlierProgram(warm_start)
-        again = make(earlier)
-        as_before = earlier.order_of(listed) if is_free else None
-        ordering = Ordering(as_before or listed, again, ends, price, is_free and not as_before)
-        changed = ordering.changed
-        for program in _unchanged_first(ordering, again, ends, is_free):
-            program = replace(program, specification=specification)
-            if program.verified:
-                return replace(program, kept=earlier.kept_seams(program, changed, why))
-            why = why or program.summary
-    ordering = Ordering(listed, work, ends, price, is_free)
+    if warm_start is None:
+        return _planned_anew(specification, work_like(), ends, weight)
+    check_earlier(warm_start, work_like().settings.robot)
+    earlier = EarlierProgram(warm_start)
+    program, changed, reason = _as_before(specification, work_like(earlier), ends, weight, earlier)
+    program = program or _planned_anew(specification, work_like(), ends, weight)
+    return replace(program, kept=earlier.kept_seams(program, changed, reason))
+
+
+def _planned_anew(
+    specification: Specification, work: Work, ends: tuple[Array | None, ...], weight: float
+) -> Program:
+    """Return the program of a job without an earlier one.
+
+    Raises
+    ------
+    PlanError
+        No seam has a motion.
+    """
+    ordering = Ordering(specification.seams, work, ends, weight, not specification.in_order)
     if not ordering.states:
-        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
-        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    program = replace(Builder(ordering, work, ends).program(), specification=specification)
-    if earlier is None:
-        return program
-    return replace(program, kept=earlier.kept_seams(program, changed, why))
+        name = work.settings.robot.name
+        reasons = "".join(f"\n  '{seam}': {why}" for seam, why in ordering.missing.items())
+        raise PlanError(f"{name}: no seam has a motion:{reasons}")
+    return replace(Builder(ordering, work, ends).program(), specification=specification)
 
 
-def _unchanged_first(
+def _as_before(
+    specification: Specification,
+    work: Work,
+    ends: tuple[Array | None, ...],
+    weight: float,
+    earlier: EarlierProgram,
+) -> tuple[Program | None, dict[str, str], str]:
+    """Return a verified program with the unchanged motions of an earlier one; None for none.
+
+    Also the seams that have changed, each with the reason, and why there is none.
+    """
+    seams, is_free = specification.seams, not specification.in_order
+    order = earlier.order_of(seams) if is_free else None
+    ordering = Ordering(order or seams, work, ends, weight, is_free and not order)
+    reason = ""
+    for program in _programs_as_before(ordering, work, ends, is_free):
+        if program.verified:
+            whole = replace(program, specification=specification)
+            return whole, ordering.changed, reason
+        reason = reason or program.summary
+    return None, ordering.changed, reason
+
+
+def _programs_as_before(
     ordering: Ordering, work: Work, ends: tuple[Array | None, ...], is_free: bool
 ) -> Iterator[Program]:
     """Yield programs with the unchanged motions of an earlier one.
 
     First in its order, where it has the same seams; then in any order; then with the unchanged
-    motions reversed as well. Where nothing is unchanged, only the first.
+    motions reversed as well. Where nothing is unchanged, only the first. Each further program frees
+    the ordering in place.
     """
     if not ordering.states:
         return
@@ -287,16 +318,27 @@ def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint,
 
 
 def _check_names(seams: Sequence[Seam], clearances: Sequence[Clearance]) -> None:
+    """Raise ProblemError where names of seams or bodies are not unique, or lead nowhere."""
+    _check_seam_names(seams)
+    left = [item.name for seam in seams for item in seam.leaves]
+    _check_bodies(left, clearances)
+    _check_references(seams, left)
+
+
+def _check_seam_names(seams: Sequence[Seam]) -> None:
     if not seams:
         raise ProblemError("there are no seams, expected one or more")
     names = [seam.name for seam in seams]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ProblemError(f"seam '{twice[0]}' is there twice; give each its own name")
-    left = [item.name for seam in seams for item in seam.leaves]
-    again = sorted({name for name in left if left.count(name) > 1})
-    if again:
-        raise ProblemError(f"'{again[0]}' is left by two seams; give each body its own name")
+
+
+def _check_bodies(left: Sequence[str], clearances: Sequence[Clearance]) -> None:
+    """Check the names of bodies that seams leave, and of obstacles."""
+    twice = sorted({name for name in left if left.count(name) > 1})
+    if twice:
+        raise ProblemError(f"'{twice[0]}' is left by two seams; give each body its own name")
     bodies: dict[str, Obstacle] = {}
     for item in (body for clearance in clearances for body in clearance.obstacles):
         if item.name in left:
@@ -308,6 +350,11 @@ def _check_names(seams: Sequence[Seam], clearances: Sequence[Clearance]) -> None
             raise ProblemError(
                 f"clearance: two different bodies are called '{item.name}'; give each its own name"
             )
+
+
+def _check_references(seams: Sequence[Seam], left: Sequence[str]) -> None:
+    """Check that seams meet bodies that are left, and come after seams of the job."""
+    names = [seam.name for seam in seams]
     for seam in seams:
         for name in seam.may_meet:
             if name not in left:
