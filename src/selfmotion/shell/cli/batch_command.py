@@ -93,7 +93,7 @@ def _items_of(
 ) -> list["Item"]:
     """Return the items that a file asks to plan.
 
-    Where it is one of many and cannot be read, one item that says so.
+    Where it is one of several files and cannot be read, one item that says so.
     """
     from selfmotion.shell.documents import grid_items
     from selfmotion.work.batch import unread_item
