@@ -86,7 +86,7 @@ def test_comments_state_deviations_tolerances_and_axes(tmp_path: Path) -> None:
     lines = lines_of(tmp_path)
     comments = Comments(lines)
     assert comments.tolerance() is None
-    assert comments.deviation().path.position == float("inf")
+    assert comments.deviations().path.position == float("inf")
     lines.notes = [
         COMMENTS.text("tolerance", length=0.25, angle=0.5),
         COMMENTS.text("axes", text="A1 = arm/one [deg], E1 = rail [mm]"),
@@ -95,15 +95,15 @@ def test_comments_state_deviations_tolerances_and_axes(tmp_path: Path) -> None:
     found = comments.tolerance()
     assert found is not None
     assert (found.position, found.rotation) == (2.5e-4, 0.5)
-    assert comments.joints() == {"A1": ("arm/one", False), "E1": ("rail", True)}
-    assert comments.step() == "seam 1"
+    assert comments.axes() == {"A1": ("arm/one", False), "E1": ("rail", True)}
+    assert comments.last_step() == "seam 1"
     # A checksum guards them: capitals and spaces count.
     lines.notes = [note.upper() for note in lines.notes]
     assert comments.tolerance() is None
-    assert comments.step() == ""
+    assert comments.last_step() == ""
     lines.notes = [COMMENTS.text("axes", text="A1 = one [deg], A2 = one [deg]")]
     with pytest.raises(sm.errors.FileFormatError, match="two axes are the same joint"):
-        comments.joints()
+        comments.axes()
 
 
 def test_comments_state_where_the_work_object_was_planned(tmp_path: Path) -> None:

@@ -212,6 +212,19 @@ def test_what_is_told_is_of_the_plan_that_is_returned(
     assert found.cost == first.report.cost
 
 
+def test_rounds_that_run_out_are_the_reason(
+    problem: sm.Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each round is verified, and none has the margin: what ended them is said all the same."""
+    first = with_margin.plan(problem)
+    monkeypatch.setattr(with_margin, "plan", lambda asked, **options: first)
+    monkeypatch.setattr(with_margin, "_ROUNDS", 2)
+    found = sm.plan_with_margin(problem, WANTED, of=("part", "base"))
+    assert not found.reached
+    assert found.refused == "2 rounds were not enough"
+    assert "no more was found: 2 rounds were not enough" in str(found)
+
+
 def test_cheaper_motions_that_are_met_are_ones_without_a_margin(
     problem: sm.Problem, found: sm.placement.PlanWithMargin, monkeypatch: pytest.MonkeyPatch
 ) -> None:

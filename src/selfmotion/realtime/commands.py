@@ -142,7 +142,9 @@ def planned_limits(limits: Array) -> Array:
 
 
 def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
-    """Return the control point c (n,) of a motion that starts at q with q̇, see `viable`.
+    """Return the control point c (n,) of a motion that starts at q with q̇.
+
+    See `viable_accelerations`.
 
     Raises
     ------
@@ -308,7 +310,7 @@ class Commands:
         self._limits = np.vstack([tightened(limits), np.zeros(robot.dof)])
         # Number of cycles in which every joint stops from its highest speed.
         stopping = int(np.ceil((limits[2] / (limits[3] * cycle)).max())) + 3
-        # c, w and a of each cycle; see `viable`.
+        # c, w and a of each cycle; see `viable_accelerations`.
         self._states = np.zeros((cycles + stopping + mean, 3, robot.dof))
         # Those of the M - 1 cycles before.
         self._past = np.zeros((mean - 1, 3, robot.dof))

@@ -2,7 +2,7 @@
 
 `make bench NAME=fuzz-realtime` shows their effect (1,000 scenarios of pushes, late steps, jumps and
 faults in a closed loop), `make bench NAME=latency` percentiles of a step and the cost of a short
-horizon. The guarantee of limits is independent of them: see `viable`.
+horizon. The guarantee of limits is independent of them: see `viable_accelerations` of `law.py`.
 """
 
 # --- the command

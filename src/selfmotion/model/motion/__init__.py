@@ -22,6 +22,7 @@ from selfmotion.model.motion.trajectory import (
     Trajectory as Trajectory,
     column_names as column_names,
     joined_motions as joined_motions,
+    part_of_motion as part_of_motion,
     reversed_motion as reversed_motion,
     slowdown_of as slowdown_of,
 )

@@ -31,6 +31,8 @@ _RATES = tuple(_MANY)
 _MOMENT = 0.5e-9
 # Largest number of samples: more do not fit into memory, and no controller takes them.
 MAX_SAMPLES = 1e7
+# Difference of times that are the same [s].
+_INSTANT = 1e-9
 
 
 def column_names(joint_names: Sequence[str]) -> list[str]:
@@ -406,6 +408,15 @@ def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
             table.append(motion(motion.t[1:], order))
     q, qd, *faster = (np.concatenate(table) for table in tables)
     return Trajectory(np.concatenate(t), q, qd, motions[0].joint_names, *faster)
+
+
+def part_of_motion(motion: Trajectory, first: float, last: float) -> Trajectory:
+    """Return the part of a motion between two times since its begin [s], from t = 0 on."""
+    first, last = motion.t[0] + first, min(motion.t[0] + last, motion.t[-1])
+    inside = motion.t[(motion.t > first + _INSTANT) & (motion.t < last - _INSTANT)]
+    t = np.concatenate([[first], inside, [last]])
+    qdd = None if motion.qdd is None else motion(t, 2)
+    return Trajectory(t - first, motion(t), motion(t, 1), motion.joint_names, qdd)
 
 
 def reversed_motion(motion: Trajectory) -> Trajectory:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import selfmotion as sm
+from selfmotion.model.motion import part_of_motion
 from selfmotion.shop import controllers
 
 Planned = sm.Plan | sm.Parts | sm.Move | sm.Program
@@ -88,11 +89,11 @@ def _judged_parts(planned: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> t
     plans, moves = [], []
     for k, (plan, begin) in enumerate(zip(planned.plans, planned.begins, strict=True)):
         end = begin + plan.trajectory.duration
-        read = replace(plan, trajectory=controllers.part_of(every, begin, end))
+        read = replace(plan, trajectory=part_of_motion(every, begin, end))
         plans.append(replace(read, certificate=read.check()))
         if k < len(planned.moves):
             after = stops[k + 1]
-            part = controllers.part_of(every, end, float(after))
+            part = part_of_motion(every, end, float(after))
             moves.append(sm.Move(planned.robot, planned.moves[k].constraints, part))
     found = replace(planned, plans=tuple(plans), moves=tuple(moves))
     return found.verified, _verdict_text(found, whole)

@@ -2,16 +2,12 @@
 
 from selfmotion.shop.controllers.controller_program import ControllerProgram as ControllerProgram
 from selfmotion.shop.controllers.judged_programs import (
-    as_shifted as as_shifted,
     controller_note as controller_note,
     differing_facts as differing_facts,
     judged_interpolations as judged_interpolations,
     judged_motion as judged_motion,
     judged_program as judged_program,
-    part_of as part_of,
-    shift_note as shift_note,
     stated_deviation as stated_deviation,
-    switching_faults as switching_faults,
 )
 from selfmotion.shop.controllers.mimic_joints import (
     mimic_joints as mimic_joints,
@@ -57,6 +53,11 @@ from selfmotion.shop.controllers.samples import (
     slowed_as as slowed_as,
     within_limits_at as within_limits_at,
 )
+from selfmotion.shop.controllers.shifted_work_objects import (
+    as_shifted as as_shifted,
+    shift_note as shift_note,
+)
+from selfmotion.shop.controllers.switched_outputs import switching_faults as switching_faults
 from selfmotion.shop.controllers.target_constraints import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,

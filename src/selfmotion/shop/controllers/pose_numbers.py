@@ -17,6 +17,8 @@ Rounding = Callable[[Array, Array], tuple[Array, Array]]
 TIME_DIGITS = 5
 # Largest rounding of a duration that is a sum of times in a program [s].
 TIME_TOLERANCE = 1e-4
+# Largest rounding of a joint position in a program [rad or m].
+JOINT_ROUNDING = 1e-6
 # Decimals of lengths in programs [mm].
 LENGTH_DIGITS = 4
 # Decimals of angles in programs [°].

@@ -146,7 +146,7 @@ class ProgramReader:
         FileFormatError
             Something is missing, or the arm cannot follow.
         """
-        said, present, file = self.comments.joints(), self.axes, self.lines.file
+        said, present, file = self.comments.axes(), self.axes, self.lines.file
         # Robots of fewer axes have numbers in the places of those they lack.
         columns = [k for k, axis in enumerate(present) if axis in said or not said]
         axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in columns)
@@ -170,13 +170,13 @@ class ProgramReader:
             self.name,
             axes,
             tuple(builder.segments),
-            self.comments.deviation(),
+            self.comments.deviations(),
             tuple(self.switches),
             program_frames.shift,
             WORLD if frames is None else program_frames.carrier,
-            next(iter(self.comments.texts("joint targets")), ""),
+            next(iter(self.comments.texts_of("joint targets")), ""),
             self.comments.tolerance(),
-            tuple(dict.fromkeys(self.comments.texts("times"))),
+            tuple(dict.fromkeys(self.comments.texts_of("times"))),
             builder.start_gap,
             self.comments.facts(),
             self.load,
@@ -246,7 +246,7 @@ class ProgramReader:
     def wait(self, seconds: float) -> None:
         """Take a rest [s]."""
         self.check_stopped("the arm is to rest")
-        self.rows.append(Row(self.comments.step(), [], [seconds]))
+        self.rows.append(Row(self.comments.last_step(), [], [seconds]))
         self.clock += seconds
 
     def switch_output(self, output: str, value: bool) -> None:
@@ -296,7 +296,7 @@ class ProgramReader:
     def _timed(self, run: list[Target]) -> list[float]:
         """Add a motion at times; return when its targets are reached [s]."""
         seconds = [target.seconds for target in run]
-        self.rows.append(Row(self.comments.step(), self._every(run), seconds))
+        self.rows.append(Row(self.comments.last_step(), self._every(run), seconds))
         return [sum(seconds[:k]) for k in range(len(run) + 1)]
 
     def _every(self, run: list[Target]) -> list[list[float] | Pose]:
@@ -319,7 +319,7 @@ class ProgramReader:
 
         Ramps are the controller's, but the seam between them is judged at its feed.
         """
-        planned = self.comments.planned()
+        planned = self.comments.take_planned_time()
         every = self._every(run)
         if planned is None:
             raise self.lines.fault(
@@ -348,7 +348,7 @@ class ProgramReader:
                 f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
                 f"less the tool never is at its speed"
             )
-        self.rows.append(Row(self.comments.step(), every, [planned], speeds, vias, is_spline))
+        self.rows.append(Row(self.comments.last_step(), every, [planned], speeds, vias, is_spline))
         times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
         return times
 

@@ -12,8 +12,8 @@ from selfmotion.shop.controllers.controller_axes import written
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.pose_segments import PoseSegment
-from selfmotion.shop.controllers.program_comments import before, head
 from selfmotion.shop.controllers.program_draft import Draft
+from selfmotion.shop.controllers.program_heads import comments_before, head_comments
 from selfmotion.shop.controllers.program_settings import Signal
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.segments import Segment
@@ -60,7 +60,7 @@ class ProgramWriter(ABC):
         lines = self.opening()
         for segment, approached in with_approaches(self.program.segments):
             lines += self.before_step()
-            notes = [f"step: {plain(segment.name)}", *before(segment)]
+            notes = [f"step: {plain(segment.name)}", *comments_before(segment)]
             lines += [self.comment(note) for note in notes]
             if approached is not None:
                 lines += self.approach(approached)
@@ -131,7 +131,7 @@ class ProgramWriter(ABC):
 
     def head(self) -> list[str]:
         """Return the comments at the head."""
-        return [self.comment(note) for note in head(self.draft)]
+        return [self.comment(note) for note in head_comments(self.draft)]
 
     def events(self, segment: Segment, target: int) -> list[str]:
         """Return the lines of what happens at a target of a segment."""

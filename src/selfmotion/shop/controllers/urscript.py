@@ -362,8 +362,8 @@ class UrscriptReader(ProgramReader):
         axes = [at for at in targets if isinstance(at, list)]
         if len(poses) == len(targets):
             return np.array(poses)
-        joints = self.comments.joints()
-        named = [joints[axis][0] for axis in self.axes if axis in joints]
+        stated = self.comments.axes()
+        named = [stated[axis][0] for axis in self.axes if axis in stated]
         known = self.robot is not None and sorted(named) == sorted(self.robot.joint_names)
         if self.robot is None or not known or len(axes) < len(targets):
             return None

@@ -35,11 +35,12 @@ from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
 # Rounds in which the clearances of pairs are adapted.
 _ROUNDS = 12
 # Clearance beyond the missing margin [m].
-_MORE = 2e-5
-# Share of a margin that its proof may fall short of it.
-_SHARE = 0.02
+_EXTRA_CLEARANCE = 2e-5
+# Largest share of the margin by which its proof may fall short.
+_PROOF_SHARE = 0.02
 # Excess over the required margin that ends the rounds, as a share.
-_ENOUGH = 0.01
+_EXCESS_SHARE = 0.01
+# What may be displaced.
 _SUBJECTS = ("part", "tool", "base")
 # Why the search ended, after Ctrl-C.
 _INTERRUPTED = "it was interrupted"
@@ -171,14 +172,14 @@ def plan_with_margin(
         problem, first, partial(shortfalls, wanted=margin, of=named, **margin_options)
     )
     search.run(margin, clearance, options, progress)
-    result = search.best or search.now
+    result = search.best or search.last
     return PlanWithMargin(
         result.plan,
         margin,
         named,
-        result.found.items,
+        result.shortfalls.items,
         result.plan.report.cost,
-        search.without,
+        search.cost_without,
         result.clearances,
         "" if search.best else search.refused,
     )
@@ -188,7 +189,7 @@ class _Trial(NamedTuple):
     """A plan, its shortfalls, and the clearances of pairs that it was planned with [m]."""
 
     plan: Plan
-    found: Shortfalls
+    shortfalls: Shortfalls
     clearances: dict[tuple[str, str], float]
 
 
@@ -200,84 +201,101 @@ class _MarginSearch:
     problem : Problem
     first : Plan
         Verified, without a margin.
-    lacks : callable
+    shortfalls_of : callable
         Plan → its shortfalls.
 
     Attributes
     ----------
-    now : _Trial
-        The last plan.
+    last : _Trial
+        The last plan that was judged.
     best : _Trial or None
         The cheapest one with the margin.
-    without : float
+    cost_without : float
         Lowest cost of a verified motion without the margin.
     refused : str
         Why the rounds ended without the margin.
     """
 
-    def __init__(self, problem: Problem, first: Plan, lacks: Callable[[Plan], Shortfalls]) -> None:
-        self._problem, self._first, self._lacks = problem, first, lacks
-        self.now = _Trial(first, lacks(first), {})
+    def __init__(
+        self, problem: Problem, first: Plan, shortfalls_of: Callable[[Plan], Shortfalls]
+    ) -> None:
+        self._problem, self._first, self._shortfalls_of = problem, first, shortfalls_of
+        self.last = _Trial(first, shortfalls_of(first), {})
         self.best: _Trial | None = None
-        self.without, self.refused = first.report.cost, ""
+        self.cost_without, self.refused = first.report.cost, ""
 
     def run(
         self, margin: Margin, clearance: float, options: dict[str, Any], progress: Progress
     ) -> None:
         """Go through the rounds."""
         problem, first = self._problem, self._first
-        narrow = problem.changed(relaxations=_narrowed(problem, margin, self.now.found.lever))
-        if not self.now.found.items and not problem.relaxations:
-            self.best = self.now
+        # Before anything else: a band that is narrower than the margin is an error.
+        narrow = problem.changed(relaxations=_narrowed(problem, margin, self.last.shortfalls.lever))
+        if not self.last.shortfalls.items and not problem.relaxations:
+            self.best = self.last
             return
         if _is_interrupted(first):
             self.refused = _INTERRUPTED
             return
         for number in range(_ROUNDS):
             progress("margin", number + 1, _ROUNDS)
-            clearances = _adjusted(self.now.clearances, self.now.found, clearance)
-            # Pairs of bodies take the place of the default.
+            clearances = _adjusted(self.last.clearances, self.last.shortfalls, clearance)
+            # Clearances of single pairs replace the clearance of the problem for these pairs.
             _, raised_clearances = separate_clearances(
-                _of_pairs(problem, clearances), narrow.clearance
+                _pair_clearances(problem, clearances), narrow.clearance
             )
             raised = narrow.changed(clearance=raised_clearances)
-            again = plan(raised, warm_start=self.now.plan, **options)
+            again = plan(raised, warm_start=self.last.plan, **options)
             if not number and not _is_interrupted(again):
                 # Past bodies there are several routes; another one may be shorter now.
-                again = min(again, plan(raised, **options), key=_rank)
-            if self._is_done(again, clearances):
-                break
+                again = min(again, plan(raised, **options), key=_by_verdict_and_cost)
+            if self._take(again, clearances):
+                return
+        if self.best is None:
+            self.refused = f"{_ROUNDS} rounds were not enough"
 
-    def _is_done(self, again: Plan, clearances: dict[tuple[str, str], float]) -> bool:
-        """Judge the plan of a round; return whether it was the last one."""
+    def _take(self, again: Plan, clearances: dict[tuple[str, str], float]) -> bool:
+        """Take in the plan of a round; return whether the rounds end with it.
+
+        It is judged by the given problem, and is the best one where it has the margin and is
+        cheaper.
+        """
         certificate = self._problem.certify(again.trajectory, self._first.tolerance)
         plan_now = replace(again, problem=self._problem, certificate=certificate)
         if certificate.verified:
             # Motions with larger clearances are valid without a margin, too.
-            self.without = min(self.without, again.report.cost)
+            self.cost_without = min(self.cost_without, again.report.cost)
         if not again.certificate.verified:
             self.refused = again.certificate.verdict.removeprefix("not verified: ")
-            # It may still have smaller shortfalls.
-            if certificate.verified:
-                more = self._lacks(plan_now)
-                if more.least > self.now.found.least:
-                    self.now = _Trial(plan_now, more, clearances)
+            self._take_refused(plan_now, clearances)
             return True
-        now = self.now = _Trial(plan_now, self._lacks(plan_now), clearances)
-        has_it = not now.found.items
-        if has_it and (self.best is None or again.report.cost < self.best.plan.report.cost):
-            self.best = now
+        last = self.last = _Trial(plan_now, self._shortfalls_of(plan_now), clearances)
+        is_reached = not last.shortfalls.items
+        if is_reached and (self.best is None or again.report.cost < self.best.plan.report.cost):
+            self.best = last
         if _is_interrupted(again):
             self.refused = _INTERRUPTED
             return True
-        return has_it and (not clearances or now.found.least <= 1.0 + _ENOUGH)
+        is_tight = not clearances or last.shortfalls.least <= 1.0 + _EXCESS_SHARE
+        return is_reached and is_tight
+
+    def _take_refused(self, plan: Plan, clearances: dict[tuple[str, str], float]) -> None:
+        """Take in a plan that does not keep the larger clearances.
+
+        It may still be verified for the given problem, and have more margin than the last plan.
+        """
+        if plan.certificate.verified:
+            found = self._shortfalls_of(plan)
+            if found.least > self.last.shortfalls.least:
+                self.last = _Trial(plan, found, clearances)
 
 
 def _is_interrupted(plan: Plan) -> bool:
     return plan.report.status is Status.INTERRUPTED
 
 
-def _rank(plan: Plan) -> tuple[bool, float]:
+def _by_verdict_and_cost(plan: Plan) -> tuple[bool, float]:
+    """Return the order of plans: verified ones first, then by cost."""
     return not plan.certificate.verified, plan.report.cost
 
 
@@ -294,9 +312,9 @@ def _adjusted(
     for item in shortfalls.items:
         pair = (min(item.pair), max(item.pair))
         far = (
-            adjusted[pair] + (1.0 - item.scale) * item.used + _MORE
+            adjusted[pair] + (1.0 - item.scale) * item.used + _EXTRA_CLEARANCE
             if pair in adjusted
-            else clearance + (1.0 + _SHARE) * item.used
+            else clearance + (1.0 + _PROOF_SHARE) * item.used
         )
         # Several clearances may have a pair: it is raised once, by the one that lacks most.
         raised[pair] = max(far, raised.get(pair, far))
@@ -318,7 +336,7 @@ def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]
     return tuple(narrowed)
 
 
-def _of_pairs(problem: Problem, clearances: dict[tuple[str, str], float]) -> list[Clearance]:
+def _pair_clearances(problem: Problem, clearances: dict[tuple[str, str], float]) -> list[Clearance]:
     """Return clearances of single pairs of bodies."""
     pair_clearances = []
     bodies = {body.name: body for item in problem.clearances for body in item.obstacles}
