@@ -144,7 +144,7 @@ def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
         looked.append(len(q))
         return smallest_singular_values(follows, q)
 
-    monkeypatch.setattr(check, "_MOST_POSES", most)
+    monkeypatch.setattr(check, "_MAX_POSES", most)
     monkeypatch.setattr(check, "smallest_singular_values", counting)
     found = sm.certify(robot, sm.paths.Dwell(robot.pose(PANDA_HOME), 2.0), "pose", motion)
     assert looked == times
@@ -157,7 +157,7 @@ def test_the_nearest_of_few_poses_is_that_of_all(
     robot, task, start, path = case
     plan = sm.plan(sm.Problem(robot, path, task, start))
     every = plan.certificate.smallest_singular_value
-    monkeypatch.setattr(check, "_MOST_POSES", 40)
+    monkeypatch.setattr(check, "_MAX_POSES", 40)
     assert plan.check().smallest_singular_value == every
 
 
@@ -175,9 +175,9 @@ def test_of_many_loops_the_nearest_pose_is_found(
     plan = sm.plan(
         sm.Problem(robot, path, "pose", PANDA_HOME, rest=False, constraints=(), clearance=None)
     )
-    monkeypatch.setattr(check, "_MOST_POSES", 1_000_000)
+    monkeypatch.setattr(check, "_MAX_POSES", 1_000_000)
     every = plan.check().smallest_singular_value
-    monkeypatch.setattr(check, "_MOST_POSES", most)
+    monkeypatch.setattr(check, "_MAX_POSES", most)
     assert plan.check().smallest_singular_value == every
 
 

@@ -287,7 +287,7 @@ def test_a_deadline_leaves_the_best_place_so_far(
 
 def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_BEGINNINGS", 2)
-    monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
+    monkeypatch.setattr(search, "_MAX_BEGINNINGS", 3)
     for given, said in (
         ({"within": {}}, "expected lowest and highest"),
         ({"within": {"up": (0, 1)}}, "no coordinate 'up'"),
@@ -310,7 +310,7 @@ def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_the_place_where_it_is_says_why_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of all places without motions the first: another one where the box does not hold that."""
-    monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
+    monkeypatch.setattr(search, "_MAX_BEGINNINGS", 3)
 
     def nowhere(self: Places, place: Array, *near: object, **given: bool) -> Tried:
         return Tried(place, np.inf, f"nothing at {place[0]:.3f}")
