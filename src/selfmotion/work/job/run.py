@@ -187,15 +187,21 @@ def plan_job(
         except KeyboardInterrupt:
             if not clock.passed:
                 raise
-            hint = (
-                "give a folder= to keep what is planned"
-                if folder is None
-                else f"what was planned by then is in '{folder}'"
-            )
-            raise DeadlineError(
-                f"{robot.name}: the deadline of {deadline} s came before there was a program; "
-                f"{hint}: plan again, or allow more time"
-            ) from None
+            raise _deadline_passed(robot, deadline, folder) from None
+
+
+def _deadline_passed(
+    robot: RobotModel, deadline: float | None, folder: str | Path | None
+) -> DeadlineError:
+    hint = (
+        "give a folder= to keep what is planned"
+        if folder is None
+        else f"what was planned by then is in '{folder}'"
+    )
+    return DeadlineError(
+        f"{robot.name}: the deadline of {deadline} s came before there was a program; {hint}: "
+        f"plan again, or allow more time"
+    )
 
 
 def _check_seams(settings: JobSettings, seams: Sequence[Seam], *, sent: bool) -> None:
