@@ -6,7 +6,7 @@ It ends where the cost has converged.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -176,6 +176,9 @@ def _require_minimum(minimum: Any, x: Array, optimizer: Optimizer) -> None:
     )
 
 
+_Motion = TypeVar("_Motion", bound="PublishedMotion")
+
+
 @dataclass(frozen=True, eq=False)
 class PublishedMotion:
     """A motion of the published method on one grid; made by `selfmotion.planning.planner`.
@@ -270,36 +273,9 @@ class PublishedMotion:
     def converged(self) -> Self:
         """Return the optimum on this grid, then on halved grids until the cost converges."""
         try:
-            return self._with_objective(self.objective).optimised()._on_finer_grids()
+            return _on_finer_grids(self._with_objective(self.objective).optimised())
         except KeyboardInterrupt:
             return replace(self, status=Status.INTERRUPTED)
-
-    def _on_finer_grids(self) -> Self:
-        """Return the optimum on the first halved grid on which its cost has converged."""
-        motion, growths = self, 0
-        most = self.method.minimum_norm.grid.steps * 2**MAX_HALVINGS
-        try:
-            while motion.steps < most and not motion._is_final:
-                finer = motion.refined()
-                cost, change = motion.cost, _change(motion.cost, finer.cost)
-                growths = growths + 1 if finer.cost > _COST_GROWTH * abs(cost) else 0
-                if growths == _MAX_GROWTHS:
-                    return finer
-                motion = finer.optimised()
-                # The optimum has to agree, too: on a coarse grid it may be no motion.
-                if max(change, _change(cost, motion.cost)) <= _AGREEMENT:
-                    break
-        except BreakdownError:
-            # On a finer grid there is no such motion: the present one is judged.
-            pass
-        except KeyboardInterrupt:
-            motion = replace(motion, status=Status.INTERRUPTED)
-        return motion
-
-    @property
-    def _is_final(self) -> bool:
-        """Whether the last optimisation ended so that the grid is not refined."""
-        return self.status.is_cut_short or self.status in _FINAL_STATUSES
 
     def _optimised_in_basis(self, size_before: int | None) -> tuple[Self, int | None]:
         """Return the optimum in one basis of the unknowns, and their number.
@@ -337,6 +313,34 @@ class PublishedMotion:
             require_finite_at(objective, self.x)
         x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
         return replace(self, objective=objective, x=x)
+
+
+def _on_finer_grids(motion: _Motion) -> _Motion:
+    """Return the optimum on the first halved grid on which its cost has converged."""
+    growths = 0
+    most = motion.method.minimum_norm.grid.steps * 2**MAX_HALVINGS
+    try:
+        while motion.steps < most and not _is_final(motion.status):
+            finer = motion.refined()
+            cost, change = motion.cost, _change(motion.cost, finer.cost)
+            growths = growths + 1 if finer.cost > _COST_GROWTH * abs(cost) else 0
+            if growths == _MAX_GROWTHS:
+                return finer
+            motion = finer.optimised()
+            # The optimum has to agree, too: on a coarse grid it may be no motion.
+            if max(change, _change(cost, motion.cost)) <= _AGREEMENT:
+                break
+    except BreakdownError:
+        # On a finer grid there is no such motion: the present one is judged.
+        pass
+    except KeyboardInterrupt:
+        motion = replace(motion, status=Status.INTERRUPTED)
+    return motion
+
+
+def _is_final(status: Status) -> bool:
+    """Whether an optimisation ended so that the grid is not refined."""
+    return status.is_cut_short or status in _FINAL_STATUSES
 
 
 def _change(before: float, after: float) -> float:

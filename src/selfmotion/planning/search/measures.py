@@ -98,11 +98,12 @@ class _StepCosts(NamedTuple):
 class RunningCost:
     """Running cost ∫ G dt of a problem, as a sum over the steps of a chain.
 
-    A step from q to q + Δq in Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for the configurations and τ
-    (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for the motion, with τ = max(Δt, |Δq| / v) and v twice the
-    mean speed of the shortest chain. Samples are farther apart than a slow self-motion moves in one
-    interval; a step is therefore counted as if it took τ. Costs of accelerations and jerks are left
-    out.
+    A step from q to q + Δq in Δt costs ½Δt (G(0, q) + G(0, q + Δq)) of costs of the configuration
+    alone. Of costs with a velocity it costs Δt G(0, q + ½Δq) for the configuration and
+    τ (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for the motion, with the tips of q, τ = max(Δt, |Δq| / v)
+    and v twice the mean speed of the shortest chain. Samples are farther apart than a slow
+    self-motion moves in one interval; a step is therefore counted as if it took τ. Costs of
+    accelerations and jerks are left out.
 
     Attributes
     ----------

@@ -137,7 +137,7 @@ class Problem:
 
     Notes
     -----
-    Attributes other than its parameters and `certify` are for planners, and may change with them.
+    Attributes other than its parameters, `certify` and `digest` may change before 1.0.
     """
 
     robot: RobotModel

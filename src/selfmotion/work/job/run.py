@@ -273,7 +273,8 @@ def _as_before(
 ) -> tuple[Program | None, dict[str, str], str]:
     """Return a verified program with the unchanged motions of an earlier one; None for none.
 
-    Also the seams that have changed, each with the reason, and why there is none.
+    Also the seams that have changed, each with the reason, and why the first attempt failed, if it
+    did.
     """
     seams, is_free = specification.seams, not specification.in_order
     order = earlier.order_of(seams) if is_free else None

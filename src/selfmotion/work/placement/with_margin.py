@@ -229,7 +229,7 @@ class _MarginSearch:
     ) -> None:
         """Go through the rounds."""
         problem, first = self._problem, self._first
-        # Before anything else: a band that is narrower than the margin is an error.
+        # Before a round: a band that is narrower than the margin is an error.
         narrow = problem.changed(relaxations=_narrowed(problem, margin, self.last.shortfalls.lever))
         if not self.last.shortfalls.items and not problem.relaxations:
             self.best = self.last
