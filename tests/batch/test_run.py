@@ -103,6 +103,10 @@ def test_values_that_are_set_are_of_all_combinations(grid: Path, tmp_path: Path)
     assert "rest = false" in (tmp_path / "one.toml").read_text()
     with pytest.raises(sm.errors.ProblemError, match=r"path\.duration is a key of its grid"):
         grid_items(grid, {"path.duration": 3.0})
+    # What is wrong with a grid is said by its reader.
+    (tmp_path / "no_grid.toml").write_text("grid = 5\n")
+    with pytest.raises(sm.errors.FileFormatError, match="grid: is 5, expected a table"):
+        grid_items(tmp_path / "no_grid.toml", {"rest": False})
 
 
 def test_two_processes_and_threads_give_the_same(

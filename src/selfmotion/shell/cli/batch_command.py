@@ -8,7 +8,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import basics
-from selfmotion.shell.cli import options, outputs, result_json, tables
+from selfmotion.shell.cli import documents, options, outputs, result_json, tables
 from selfmotion.shell.cli.app import (
     NOT_VERIFIED,
     PLAN,
@@ -39,7 +39,7 @@ def batch(
     deadline: options.DeadlineOption = None,
     settings: options.SetOption = None,
     replays: Annotated[
-        int, typer.Option(min=0, help="Write replays of so many of the best plans.")
+        int, typer.Option(min=0, help="Number of best plans to write replays of.")
     ] = 3,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
@@ -84,7 +84,7 @@ def batch(
 def _changes(settings: Sequence[str] | None, folder: Path) -> dict[str, Any]:
     """Return what ``--set KEY=VALUE`` says, by key; relative file names are those of `folder`."""
     pairs = [parse_setting(text, folder) for text in settings or ()]
-    options.refuse_twice("--set", [key for key, _ in pairs])
+    documents.refuse_same_keys(pairs)
     return dict(pairs)
 
 

@@ -75,9 +75,7 @@ class DocumentOptions:
                 self.start if named else options.numbers(self.start, "--start").tolist()
             )
         pairs = [*before.items(), *settings, *after.items()]
-        # The same in another unit is the same.
-        keys = [key.removesuffix("_deg").removesuffix("_mm") for key, _ in pairs]
-        options.refuse_twice("--set", keys)
+        refuse_same_keys(pairs)
         for key, value in pairs:
             set_key(document, key, value)
 
@@ -96,6 +94,12 @@ HOW_TO_PLAN = (
 _STARTS = ("home", "dexterous", "free")
 # Tool motions that may begin where the arm does.
 _SHAPES = ("circle", "line", "spiral")
+
+
+def refuse_same_keys(pairs: Iterable[tuple[str, Any]]) -> None:
+    """Raise ProblemError where a key is set twice; the same in another unit is the same."""
+    keys = [key.removesuffix("_deg").removesuffix("_mm") for key, _ in pairs]
+    options.refuse_twice("--set", keys)
 
 
 def document_of(file: Path, settings: Sequence[str] | None) -> dict[str, Any]:
@@ -183,25 +187,26 @@ def refuse_how_to_plan(said: DocumentOptions, besides: str = "") -> None:
 
     All but `besides`, a key that has an effect.
     """
-    for text in said.settings or ():
-        key, _ = parse_setting(text)
-        part = key.partition(".")[0]
-        if part in HOW_TO_PLAN and part != besides:
-            raise sm.errors.ProblemError(
-                f"--set {key}: says how to plan, and this motion is there already: leave it out "
-                f"(what check allows: --tolerance, --turn)"
-            )
+    _refuse_keys(
+        said,
+        [part for part in HOW_TO_PLAN if part != besides],
+        "says how to plan, and this motion is there already: leave it out (what check allows: "
+        "--tolerance, --turn)",
+    )
 
 
 def refuse_costs(said: DocumentOptions) -> None:
     """Raise ProblemError for keys of costs, which no verdict depends on."""
+    reason = "a verdict does not depend on costs: leave it out (compare tells what motions cost)"
+    _refuse_keys(said, ["costs"], reason)
+
+
+def _refuse_keys(said: DocumentOptions, parts: Sequence[str], reason: str) -> None:
+    """Raise ProblemError, with a reason, where a key of some parts of a document is set."""
     for text in said.settings or ():
         key, _ = parse_setting(text)
-        if key.partition(".")[0] == "costs":
-            raise sm.errors.ProblemError(
-                f"--set {key}: a verdict does not depend on costs: leave it out (compare tells "
-                f"what motions cost)"
-            )
+        if key.partition(".")[0] in parts:
+            raise sm.errors.ProblemError(f"--set {key}: {reason}")
 
 
 def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:

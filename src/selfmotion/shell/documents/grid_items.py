@@ -29,7 +29,8 @@ def grid_items(
     """
     cache: dict[str, Any] = {}
     document, changes = read_document(file), changes or {}
-    twice = [key for key in changes if key in document.get("grid", {})]
+    grid = document.get("grid")
+    twice = [key for key in changes if isinstance(grid, Mapping) and key in grid]
     if twice:
         raise ProblemError(
             f"{file}: {twice[0]} is a key of its grid, and set as well: leave out one"
