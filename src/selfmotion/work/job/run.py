@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
@@ -26,25 +23,27 @@ from selfmotion.basics import (
     as_whole,
     check_executor,
     held_interruption,
-    nearest,
     obeying,
     shown,
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.model.collision import Obstacle
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import Deadline
 from selfmotion.planning.result import arm_digest
-from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.constraints import (
     NO_OVERLAP,
     Clearance,
     Constraint,
     as_clearances,
-    clearances_among,
 )
-from selfmotion.problem.problem import KEPT, check_all_times, check_feeds, envelope_without_arm
+from selfmotion.problem.problem import KEPT
+from selfmotion.work.job.checks import (
+    check_ends,
+    check_names,
+    check_seams,
+    checked_constraints,
+)
 from selfmotion.work.job.earlier_program import EarlierProgram, check_earlier
 from selfmotion.work.job.ordering import Ordering
 from selfmotion.work.job.program import Program
@@ -52,7 +51,7 @@ from selfmotion.work.job.program_builder import Builder
 from selfmotion.work.job.result_cache import ResultCache
 from selfmotion.work.job.seam import Seam
 from selfmotion.work.job.specification import Specification
-from selfmotion.work.job.work import JobSettings, Work, check_can_be_sent
+from selfmotion.work.job.work import JobSettings, Work
 
 
 def plan_job(
@@ -152,10 +151,10 @@ def plan_job(
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     listed = as_several(seams, "seams", Seam)
     clearances = as_clearances(clearance)
-    _check_names(listed, clearances)
+    check_names(listed, clearances)
     settings = JobSettings(
         robot,
-        _checked_constraints(constraints),
+        checked_constraints(constraints),
         clearances,
         as_whole(branches, "branches", 1, 1000),
         as_number(move_seconds, "move_seconds", above=0.0),
@@ -164,11 +163,11 @@ def plan_job(
     check_executor(executor)
     clock = Deadline.after(deadline)
     reported = clock.checked_by(obeying(progress))
-    _check_seams(settings, listed, sent=folder is not None or executor is not None)
+    check_seams(settings, listed, sent=folder is not None or executor is not None)
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     weight = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
-    _check_ends(settings, ends)
+    check_ends(settings, ends)
     # Processes and schedulers wait for Ctrl-C themselves.
     with nullcontext() if executor is not None else held_interruption():
         cache = ResultCache(None if folder is None else as_path(folder), Tolerance(), {})
@@ -181,9 +180,9 @@ def plan_job(
             clearances=settings.clearances,
             arm=arm_digest(robot),
         )
-        work_like = partial(Work, settings, cache, executor, reported)
+        planner = _JobPlanner(specification, settings, cache, executor, reported, ends, weight)
         try:
-            return _program(specification, work_like, ends, weight, warm_start)
+            return planner.program(warm_start)
         except KeyboardInterrupt:
             if not clock.passed:
                 raise
@@ -204,173 +203,98 @@ def _deadline_passed(
     )
 
 
-def _check_seams(settings: JobSettings, seams: Sequence[Seam], *, sent: bool) -> None:
-    """Raise FeedError for the slowest seam whose path cannot have its feed.
+@dataclass(frozen=True, eq=False)
+class _JobPlanner:
+    """Plans a job: first with the unchanged motions of an earlier program, if there is one.
 
-    Where seams are `sent` to other processes, raise ProblemError for a cost that cannot be.
+    Attributes
+    ----------
+    specification : Specification
+    settings : JobSettings
+    cache : ResultCache
+    executor : Executor or None
+    progress : Progress
+    ends : (start, end)
+        Configurations (n,) in which the program begins and ends; None where any will do.
+    seconds_per_cost : float
+        What a unit of a seam's cost counts [s].
     """
-    for seam in sorted(seams, key=_slowest):
-        kept = envelope_without_arm(settings.robot, [*settings.constraints, *seam.constraints])
-        check_feeds(f"seam '{seam.name}'", [seam.path], kept.tool_speed)
-    for seam in seams if sent else ():
-        check_can_be_sent(seam.costs or ())
 
+    specification: Specification
+    settings: JobSettings
+    cache: ResultCache
+    executor: Executor | None
+    progress: Progress
+    ends: tuple[Array | None, ...]
+    seconds_per_cost: float
 
-def _check_ends(settings: JobSettings, ends: Sequence[Array | None]) -> None:
-    """Raise ProblemError where no move may begin at the job's start, or end at its end."""
-    moves = FreeMotions(settings.robot, settings.move_constraints(()), np.random.default_rng(0))
-    for name, q in zip(("start", "end"), ends, strict=True):
-        refused = "" if q is None else moves.refusal(q)
-        if refused:
-            raise ProblemError(f"{settings.robot.name}: the job's {name}: {refused}")
+    def program(self, warm_start: Program | None) -> Program:
+        """Return the program of the job."""
+        if warm_start is None:
+            return self._anew()
+        check_earlier(warm_start, self.settings.robot)
+        earlier = EarlierProgram(warm_start)
+        kept, changed, reason = self._as_before(earlier)
+        program = kept or self._anew()
+        return replace(program, kept=earlier.kept_seams(program, changed, reason))
 
+    def _work(self, earlier: EarlierProgram | None = None) -> Work:
+        """Return what plans seams and moves, the unchanged ones as before."""
+        return Work(self.settings, self.cache, self.executor, self.progress, earlier)
 
-def _program(
-    specification: Specification,
-    work_like: Callable[..., Work],
-    ends: tuple[Array | None, ...],
-    weight: float,
-    warm_start: Program | None,
-) -> Program:
-    """Return the program of a job: first with the unchanged motions of an earlier one, if any.
+    def _ordering(self, seams: Sequence[Seam], work: Work, *, is_free: bool) -> Ordering:
+        return Ordering(seams, work, self.ends, self.seconds_per_cost, is_free)
 
-    `work_like` returns the `Work` that plans seams and moves, given the earlier program; `weight`
-    is that of a seam's cost against time [s].
-    """
-    if warm_start is None:
-        return _planned_anew(specification, work_like(), ends, weight)
-    check_earlier(warm_start, work_like().settings.robot)
-    earlier = EarlierProgram(warm_start)
-    program, changed, reason = _as_before(specification, work_like(earlier), ends, weight, earlier)
-    program = program or _planned_anew(specification, work_like(), ends, weight)
-    return replace(program, kept=earlier.kept_seams(program, changed, reason))
+    @property
+    def _is_free(self) -> bool:
+        return not self.specification.in_order
 
+    def _anew(self) -> Program:
+        """Return the program of a job without an earlier one.
 
-def _planned_anew(
-    specification: Specification, work: Work, ends: tuple[Array | None, ...], weight: float
-) -> Program:
-    """Return the program of a job without an earlier one.
+        Raises
+        ------
+        PlanError
+            No seam has a motion.
+        """
+        work = self._work()
+        ordering = self._ordering(self.specification.seams, work, is_free=self._is_free)
+        if not ordering.states:
+            reasons = "".join(f"\n  '{seam}': {why}" for seam, why in ordering.missing.items())
+            raise PlanError(f"{self.settings.robot.name}: no seam has a motion:{reasons}")
+        program = Builder(ordering, work, self.ends).program()
+        return replace(program, specification=self.specification)
 
-    Raises
-    ------
-    PlanError
-        No seam has a motion.
-    """
-    ordering = Ordering(specification.seams, work, ends, weight, not specification.in_order)
-    if not ordering.states:
-        name = work.settings.robot.name
-        reasons = "".join(f"\n  '{seam}': {why}" for seam, why in ordering.missing.items())
-        raise PlanError(f"{name}: no seam has a motion:{reasons}")
-    return replace(Builder(ordering, work, ends).program(), specification=specification)
+    def _as_before(self, earlier: EarlierProgram) -> tuple[Program | None, dict[str, str], str]:
+        """Return a verified program with the unchanged motions of an earlier one; None for none.
 
+        Also the seams that have changed, each with the reason, and why the first attempt failed, if
+        it did.
+        """
+        seams, work = self.specification.seams, self._work(earlier)
+        order = earlier.order_of(seams) if self._is_free else None
+        ordering = self._ordering(order or seams, work, is_free=self._is_free and not order)
+        reason = ""
+        for program in self._programs_as_before(ordering, work):
+            if program.verified:
+                whole = replace(program, specification=self.specification)
+                return whole, ordering.changed, reason
+            reason = reason or program.summary
+        return None, ordering.changed, reason
 
-def _as_before(
-    specification: Specification,
-    work: Work,
-    ends: tuple[Array | None, ...],
-    weight: float,
-    earlier: EarlierProgram,
-) -> tuple[Program | None, dict[str, str], str]:
-    """Return a verified program with the unchanged motions of an earlier one; None for none.
+    def _programs_as_before(self, ordering: Ordering, work: Work) -> Iterator[Program]:
+        """Yield programs with the unchanged motions of an earlier one.
 
-    Also the seams that have changed, each with the reason, and why the first attempt failed, if it
-    did.
-    """
-    seams, is_free = specification.seams, not specification.in_order
-    order = earlier.order_of(seams) if is_free else None
-    ordering = Ordering(order or seams, work, ends, weight, is_free and not order)
-    reason = ""
-    for program in _programs_as_before(ordering, work, ends, is_free):
-        if program.verified:
-            whole = replace(program, specification=specification)
-            return whole, ordering.changed, reason
-        reason = reason or program.summary
-    return None, ordering.changed, reason
-
-
-def _programs_as_before(
-    ordering: Ordering, work: Work, ends: tuple[Array | None, ...], is_free: bool
-) -> Iterator[Program]:
-    """Yield programs with the unchanged motions of an earlier one.
-
-    First in its order, where it has the same seams; then in any order; then with the unchanged
-    motions reversed as well. Where nothing is unchanged, only the first. Each further program frees
-    the ordering in place.
-    """
-    if not ordering.states:
-        return
-    yield Builder(ordering, work, ends).program()
-    if ordering.has_unchanged and is_free and not ordering.is_free:
-        ordering.free(order=True, directions=False)
-        yield Builder(ordering, work, ends).program()
-    if ordering.has_unchanged:
-        ordering.free(order=is_free, directions=True)
-        yield Builder(ordering, work, ends).program()
-
-
-def _slowest(seam: Seam) -> float:
-    """Return the speed of a seam that does not keep its feed [m/s]; inf for one that does."""
-    return min((found.slowest for found in seam.path.feeds if not found.kept), default=math.inf)
-
-
-def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    listed = as_several(constraints, "constraints", Constraint)
-    check_all_times(listed, "give it to a seam that has one direction (either_way=False)")
-    if clearances_among(listed):
-        raise ProblemError(
-            "a Clearance is among the constraints of the job; give it as clearance=, so that "
-            "what seams leave behind is kept clear of as well"
-        )
-    return listed
-
-
-def _check_names(seams: Sequence[Seam], clearances: Sequence[Clearance]) -> None:
-    """Raise ProblemError where names of seams or bodies are not unique, or lead nowhere."""
-    _check_seam_names(seams)
-    left = [item.name for seam in seams for item in seam.leaves]
-    _check_bodies(left, clearances)
-    _check_references(seams, left)
-
-
-def _check_seam_names(seams: Sequence[Seam]) -> None:
-    if not seams:
-        raise ProblemError("there are no seams, expected one or more")
-    names = [seam.name for seam in seams]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ProblemError(f"seam '{twice[0]}' is there twice; give each its own name")
-
-
-def _check_bodies(left: Sequence[str], clearances: Sequence[Clearance]) -> None:
-    """Check the names of bodies that seams leave, and of obstacles."""
-    twice = sorted({name for name in left if left.count(name) > 1})
-    if twice:
-        raise ProblemError(f"'{twice[0]}' is left by two seams; give each body its own name")
-    bodies: dict[str, Obstacle] = {}
-    for item in (body for clearance in clearances for body in clearance.obstacles):
-        if item.name in left:
-            raise ProblemError(
-                f"'{item.name}' is an obstacle of the clearance, and left by a seam; give each "
-                f"body its own name"
-            )
-        if bodies.setdefault(item.name, item).to_dict() != item.to_dict():
-            raise ProblemError(
-                f"clearance: two different bodies are called '{item.name}'; give each its own name"
-            )
-
-
-def _check_references(seams: Sequence[Seam], left: Sequence[str]) -> None:
-    """Check that seams meet bodies that are left, and come after seams of the job."""
-    names = [seam.name for seam in seams]
-    for seam in seams:
-        for name in seam.may_meet:
-            if name not in left:
-                raise ProblemError(
-                    f"seam '{seam.name}' may meet '{name}', which no seam leaves"
-                    f"{nearest(name, left)}"
-                )
-        for name in (*seam.after, *seam.after_any):
-            if name not in names or name == seam.name:
-                raise ProblemError(
-                    f"seam '{seam.name}' comes after '{name}', which is no other seam of the job"
-                )
+        First in its order, where it has the same seams; then in any order; then with the unchanged
+        motions reversed as well. Where nothing is unchanged, only the first. Each further program
+        frees the ordering in place.
+        """
+        if not ordering.states:
+            return
+        yield Builder(ordering, work, self.ends).program()
+        if ordering.has_unchanged and self._is_free and not ordering.is_free:
+            ordering.free(order=True, directions=False)
+            yield Builder(ordering, work, self.ends).program()
+        if ordering.has_unchanged:
+            ordering.free(order=self._is_free, directions=True)
+            yield Builder(ordering, work, self.ends).program()
