@@ -12,6 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import check
 from selfmotion.certificate.check import _damped_intervals, _damping_cause, _undecided, _violations
 from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
+from selfmotion.model.follow import Follows
 from selfmotion.model.task import DampingLaw
 from support.arms import PANDA_HOME, Case, robot_named, short_line
 from support.motions import motion_of
@@ -316,3 +317,17 @@ def test_what_lasts_longer_than_its_path_is_judged_by_what_the_tool_does_in_it(
     found = plan.problem.certify(longer, plan.tolerance)
     assert ("too long" in found.verdict) is (speed > 0.0)
     assert found.verified is (speed == 0.0)
+
+
+def test_singular_values_are_those_of_the_task_jacobian(planar: sm.RobotModel) -> None:
+    """Also next to a singular pose, with the arm stretched: there squares have no digits."""
+    bent = np.array([0.0, 1e-9, 1e-6, 1e-4, 1e-2, 0.3])
+    q = 0.3 + np.outer(bent, [0.0, 1.0, -0.4]) - [0.0, 0.3, 0.3]
+    path = sm.paths.Dwell(planar.pose(q[0]), 1.0)
+    follows = Follows.of(planar, path, sm.Task.PLANAR)
+    expected = [
+        np.linalg.svd(planar.task_jacobian(each, sm.Task.PLANAR), compute_uv=False)[-1]
+        for each in q
+    ]
+    assert expected[0] < 1e-12 < expected[1] < 1e-8 < expected[2] < 1e-5 < 1e-2 < expected[-1]
+    np.testing.assert_allclose(smallest_singular_values(follows, q), expected, atol=1e-12)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.path.turning import Turning
+from selfmotion.model.path.splines import Turning
 from support.paths import pose, random_waypoints
 
 

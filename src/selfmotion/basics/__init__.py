@@ -19,6 +19,7 @@ from selfmotion.basics.arrays import (
     Flags as Flags,
     Ints as Ints,
     per_joint as per_joint,
+    plain as plain,
     plain_numbers as plain_numbers,
     read_only as read_only,
     shown as shown,

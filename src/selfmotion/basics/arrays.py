@@ -26,6 +26,14 @@ def read_only(values: npt.ArrayLike) -> Array:
     return array
 
 
+def plain(values: Array) -> Array:
+    """Return an array as kernels take it: contiguous and writeable; a copy where it is not.
+
+    For each other kind of array numba would compile another kernel.
+    """
+    return values if values.flags.carray else np.array(values, dtype=np.float64)
+
+
 def per_joint(values: npt.ArrayLike, dof: int, what: str, *, positive: bool = False) -> Array:
     """Return one number for all joints, or one for each, as a read-only array (n,).
 

@@ -15,7 +15,8 @@ from math import comb
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics.arrays import Array
+from selfmotion.basics.arrays import Array, plain
+from selfmotion.basics.jit import kernel
 
 # Largest number of nodes of an interval.
 ORDER = 12
@@ -32,10 +33,8 @@ def constant(values: npt.ArrayLike, like: Array) -> Array:
 
 def product(a: Array, b: Array) -> Array:
     """Return the series of a product, as long as the shorter one."""
-    length = min(len(a), len(b))
-    found: Array = a[0] * b[:length]
-    for k in range(1, length):
-        found[k:] += a[k] * b[: length - k]
+    found = np.zeros((min(len(a), len(b)), a.shape[1]))
+    _multiply(plain(a), plain(b), found)
     return found
 
 
@@ -45,11 +44,8 @@ def exponential(a: Array) -> Array:
     As exp(A + B) = e^A + ∫ e^((1-s)A) B e^(sA) ds + …, with e^(sA) orthogonal, the n-th term is at
     most |B|ⁿ/n! (F. J. Dyson, Phys. Rev. 75, 1949; R. M. Wilcox, J. Math. Phys. 8, 1967).
     """
-    weighted = a * np.arange(float(len(a)))[:, None]
-    found = np.zeros_like(a)
-    found[0] = 1.0
-    for k in range(1, len(a)):
-        found[k] = np.einsum("ji,ji->i", weighted[1 : k + 1], found[k - 1 :: -1]) / k
+    found = np.zeros(a.shape)
+    _exponentiate(plain(a), found)
     return found
 
 
@@ -58,17 +54,8 @@ def composed(outer: Array, inner: Array) -> Array:
 
     The outer one's coefficients are per unit of g.
     """
-    length = len(inner)
-    moved = np.zeros((2 * length - 1, *inner.shape[1:]))
-    moved[length:] = inner[1:]
-    # By row and column: factor of a coefficient, of g without its first, for the later ones.
-    by = moved[np.arange(length)[:, None] - np.arange(length) + length - 1]
-    found = np.zeros_like(inner)
-    # Horner's scheme: each product shifts by at least one, so that the first ones need few terms.
-    for left, coefficient in zip(range(len(outer) - 1, -1, -1), outer[::-1], strict=True):
-        k = max(length - left, 1)
-        found[:k] = np.einsum("kji,ji->ki", by[:k, :k], found[:k])
-        found[0] += coefficient
+    found = np.zeros(inner.shape)
+    _compose(plain(outer), plain(inner), found)
     return found
 
 
@@ -147,15 +134,13 @@ def bernstein(degree: int) -> Array:
 
 def recentred(coefficients: Array, middle: Array, half: Array) -> Array:
     """Return the coefficients of p(middle + half · u); both broadcast with one coefficient."""
-    found = np.zeros(
-        (len(coefficients), *np.broadcast_shapes(coefficients.shape[1:], middle.shape))
-    )
-    for coefficient in coefficients[::-1]:
-        risen = middle * found
-        risen[1:] += half * found[:-1]
-        risen[0] += coefficient
-        found = risen
-    return found
+    shape = np.broadcast_shapes(coefficients.shape[1:], middle.shape)
+    size = len(coefficients)
+    given = np.broadcast_to(coefficients, (size, *shape)).reshape(size, -1)
+    centre, reach = (np.broadcast_to(x, shape).reshape(-1) for x in (middle, half))
+    found = np.zeros(given.shape)
+    _recentre(plain(given), plain(centre), plain(reach), found)
+    return found.reshape(size, *shape)
 
 
 def holds_for(item: object, *methods: str) -> bool:
@@ -176,3 +161,50 @@ def after_first(a: Array) -> Array:
 @cache
 def _binomials(size: int) -> Array:
     return np.array([[comb(j, k) for j in range(size)] for k in range(size)], dtype=np.float64)
+
+
+@kernel
+def _multiply(a: Array, b: Array, found: Array) -> None:
+    for k in range(len(found)):
+        for j in range(k + 1):
+            for i in range(found.shape[1]):
+                found[k, i] += a[j, i] * b[k - j, i]
+
+
+@kernel
+def _exponentiate(a: Array, found: Array) -> None:
+    """Set the coefficients of E = exp(A - a₀) by those of E' = A' E."""
+    for i in range(found.shape[1]):
+        found[0, i] = 1.0
+    for k in range(1, len(found)):
+        for j in range(1, k + 1):
+            share = j / k
+            for i in range(found.shape[1]):
+                found[k, i] += share * a[j, i] * found[k - j, i]
+
+
+@kernel
+def _compose(outer: Array, inner: Array, found: Array) -> None:
+    """Set f(g - g₀) by Horner's scheme.
+
+    Each product shifts by at least one, so that the first ones need few terms.
+    """
+    length = len(inner)
+    for left in range(len(outer) - 1, -1, -1):
+        for k in range(max(length - left, 1) - 1, -1, -1):
+            for i in range(found.shape[1]):
+                total = 0.0
+                for j in range(1, k + 1):
+                    total += inner[j, i] * found[k - j, i]
+                found[k, i] = total
+        for i in range(found.shape[1]):
+            found[0, i] += outer[left, i]
+
+
+@kernel
+def _recentre(coefficients: Array, middle: Array, half: Array, found: Array) -> None:
+    for c in range(len(coefficients) - 1, -1, -1):
+        for k in range(len(coefficients) - 1, -1, -1):
+            for i in range(found.shape[1]):
+                before = half[i] * found[k - 1, i] if k > 0 else coefficients[c, i]
+                found[k, i] = middle[i] * found[k, i] + before

@@ -17,6 +17,8 @@ from selfmotion.model.robot import WORLD, Chain, RobotModel
 from selfmotion.model.task import Relaxation, Task
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+# Singular value below which it is not taken from an eigenvalue: above, it is right to 1e-12.
+_NEAR_SINGULAR = 1e-3
 
 
 def deviation_from(follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool) -> Array:
@@ -43,8 +45,13 @@ def smallest_singular_values(follows: Follows, q: Array) -> Array:
     for item in follows.items:
         jacobian, rotation = jacobians(item.chain, q)
         rows.append(item.task.select_along(jacobian, rotation))
-    values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
-    return values[:, -1].astype(np.float64)
+    every = np.concatenate(rows, axis=1)
+    squares = np.linalg.eigvalsh(every @ every.transpose(0, 2, 1))[:, 0]
+    # Square roots of small eigenvalues have lost digits.
+    found, near = np.sqrt(np.maximum(squares, 0.0)), squares < _NEAR_SINGULAR**2
+    if near.any():
+        found[near] = np.linalg.svd(every[near], compute_uv=False)[:, -1]
+    return np.asarray(found)
 
 
 def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:

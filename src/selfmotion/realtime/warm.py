@@ -64,7 +64,8 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     formulation = Formulation.of(alone)
     nodes = NodeGrid(formulation, t, BoundConditions(), free=False, counts=Counts())
     yield "nodes", lambda: _modelled(nodes.near(np.tile(home, (5, 1)), at_rest, at_rest))
-    yield "a given start", plan(alone)
+    # Of waypoints: they have kernels of their own.
+    yield "a given start", plan(replace(alone, path=_through(circle)))
     given = sm.Problem(arm, circle, "position", home)
     free = replace(given, start=None)
     yield "self-collision", plan(given)
@@ -100,6 +101,12 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "orders of many seams", lambda: improved(_two_stops())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
     yield "a replanner", lambda: warm_up(Replanner(arm, "position"))
+
+
+def _through(path: sm.paths.Path) -> sm.paths.Waypoints:
+    """Return a path of waypoints on another one."""
+    t = np.linspace(0.0, path.duration, 5)
+    return sm.paths.Waypoints.from_poses(t, path.pose(t))
 
 
 def _modelled(motion: NodeMotion | None) -> None:

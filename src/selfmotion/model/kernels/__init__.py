@@ -37,6 +37,7 @@ from selfmotion.model.kernels.stages import (
     Law as Law,
     advance as advance,
     at_tip as at_tip,
+    evaluate_motion as evaluate_motion,
     pullback as pullback,
     sensitivities as sensitivities,
     space_size as space_size,

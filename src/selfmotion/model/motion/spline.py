@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, series
+from selfmotion.basics import Array, Ints, kernel, plain, series
 
 # Relative size below which a leading coefficient counts as zero.
 _NOTHING = 1e-13
@@ -190,8 +190,12 @@ class Spline:
         return np.concatenate([*found, self._at(self.t[-1:], order)])
 
     def _at(self, t: Array, order: int) -> Array:
-        k, s = self.place(t)
-        return evaluated(self.segments(k, order), s[..., None])
+        if len(self.t) > _CHUNK:
+            k, s = self.place(t)
+            return evaluated(self.segments(k, order), s[..., None])
+        found = np.empty((t.size, self.q.shape[1]))
+        evaluate_pieces(self._knots, self._every(order), plain(t.ravel()), found)
+        return found.reshape(*t.shape, -1)
 
     def travelled(self, t: Array) -> Array:
         """Return the path lengths up to times t (K,), (K, n)."""
@@ -213,15 +217,27 @@ class Spline:
         """
         if len(self.t) > _CHUNK:
             return self._differentiated(k, order)
-        if order not in self._derivatives:
-            every = np.arange(len(self.t) - 1)
-            self._derivatives[order] = self._differentiated(every, order)
-        return self._derivatives[order][:, k]
+        return self._every(order)[:, k]
+
+    def _every(self, order: int) -> Array:
+        """Return the segments of a derivative in all intervals, of a motion with few samples."""
+        found = self._derivatives.get(order)
+        if found is None:
+            found = (
+                plain(self._of(np.arange(len(self.t) - 1)))
+                if order == 0
+                else differentiated(self._every(order - 1)) / np.diff(self.t)[:, None]
+            )
+            self._derivatives[order] = found
+        return found
 
     @cached_property
     def _derivatives(self) -> dict[int, Array]:
-        """Cached segments of derivatives, of a motion with few samples."""
         return {}
+
+    @cached_property
+    def _knots(self) -> Array:
+        return plain(self.t)
 
     def _differentiated(self, k: Ints, order: int) -> Array:
         if order == 0:
@@ -244,3 +260,30 @@ def _in_chunks(function: Callable[[Array], Array], t: Array) -> Array:
     if t.ndim != 1 or len(t) <= _CHUNK:
         return function(t)
     return np.concatenate([function(t[k : k + _CHUNK]) for k in range(0, len(t), _CHUNK)])
+
+
+@kernel
+def evaluate_pieces(knots: Array, pieces: Array, t: Array, found: Array) -> None:
+    """Set the values (K, n) at times t (K,) of polynomials (m, N - 1, n) between N knots.
+
+    Coefficients of 1, s, s² … with s from 0 to 1; the first and the last piece go on beyond.
+    """
+    degree, last = len(pieces) - 1, len(knots) - 2
+    piece = 0
+    for k in range(len(t)):
+        # Times mostly come in order.
+        if not (knots[piece] <= t[k] and (piece == last or t[k] < knots[piece + 1])):
+            low, high = 0, last + 1
+            while high - low > 1:
+                middle = (low + high) // 2
+                if t[k] >= knots[middle]:
+                    low = middle
+                else:
+                    high = middle
+            piece = low
+        s = (t[k] - knots[piece]) / (knots[piece + 1] - knots[piece])
+        for j in range(found.shape[1]):
+            value = pieces[degree, piece, j]
+            for power in range(degree - 1, -1, -1):
+                value = value * s + pieces[power, piece, j]
+            found[k, j] = value

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -22,7 +23,7 @@ from selfmotion.model.path.base import (
     rotations_about,
     unit,
 )
-from selfmotion.model.task import SE3, log3
+from selfmotion.model.task import SE3, log3, skew
 
 # Minimum jerk's coefficients of 1, τ, τ² …
 _JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
@@ -230,7 +231,7 @@ class Circle(Round, kind="circle"):
         """Distance of the tool from the axis [m]."""
         return float(np.linalg.norm(self._arm - self.normal * (self.normal @ self._arm)))
 
-    @property
+    @cached_property
     def _arm(self) -> Array:
         return np.asarray(self.start.translation - self.center)
 
@@ -240,9 +241,10 @@ class Circle(Round, kind="circle"):
         angle = 2.0 * np.pi * self.turns
         turned = rotations_about(self.normal, angle * s)
         arms = turned @ self._arm
-        omega = (angle / self.duration * speed)[:, None] * self.normal
-        rotation, angular = self._oriented(turned, omega)
-        twist = np.hstack([np.cross(omega, arms), angular])
+        rate = (angle / self.duration * speed)[:, None]
+        rotation, angular = self._oriented(turned, rate * self.normal)
+        # ω × arm, for ω along the axis.
+        twist = np.hstack([rate * (arms @ skew(self.normal).T), angular])
         return PathSamples(t, self.center + arms, rotation, twist)
 
     @override

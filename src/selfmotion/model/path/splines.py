@@ -1,14 +1,42 @@
-"""A smooth turning through given orientations, and its rate."""
+"""Splines through given positions, and through given orientations, with their rates."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import (
-    Array,
-)
-from selfmotion.model.task import exponentials, products
+from selfmotion.basics import Array, plain
+from selfmotion.model.path.spline_kernels import cubics_at, turns_at
+
+
+class Cubics:
+    """scipy's `CubicSpline` (C², not-a-knot) through positions.
+
+    Parameters
+    ----------
+    t : (N,)
+        Times [s].
+    points : (N, 3)
+        [m].
+
+    Attributes
+    ----------
+    x : (N,)
+        The times.
+    c : (4, N - 1, 3)
+        Coefficients, the highest first.
+    """
+
+    def __init__(self, t: Array, points: Array) -> None:
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(t, points)
+        self.x, self.c = plain(spline.x), plain(spline.c)
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Return positions and velocities at times, (K, 3) each."""
+        values, rates = np.empty((len(t), 3)), np.empty((len(t), 3))
+        cubics_at(self.x, self.c, plain(t), values, rates)
+        return values, rates
 
 
 class Turning:
@@ -35,17 +63,11 @@ class Turning:
         from scipy.spatial.transform import Rotation, RotationSpline
 
         spline = RotationSpline(t, Rotation.from_quat(quaternions, scalar_first=True))
-        self.x: Array = spline.interpolator.x
-        self.c: Array = spline.interpolator.c
-        self._first: Array = spline.rotations.as_matrix()
+        self.x, self.c = plain(spline.interpolator.x), plain(spline.interpolator.c)
+        self._first = plain(spline.rotations.as_matrix())
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return orientations (K, 3, 3) and angular velocities (K, 3) at times, world axes."""
-        k: npt.NDArray[np.intp] = np.searchsorted(self.x[1:-1], t, side="right")
-        s = (t - self.x[k])[:, None]
-        cubic, square, slope, none = self.c.take(k, axis=1)
-        vectors = ((cubic * s + square) * s + slope) * s + none
-        rates = (3.0 * cubic * s + 2.0 * square) * s + slope
-        first = self._first[k]
-        rotations, angular = exponentials(vectors, rates)
-        return first @ rotations, products(first, angular)
+        rotations, angular = np.empty((len(t), 3, 3)), np.empty((len(t), 3))
+        turns_at(self.x, self.c, self._first, plain(t), rotations, angular)
+        return rotations, angular

@@ -31,7 +31,7 @@ from selfmotion.model.task import SE3, Quaternion
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-from selfmotion.model.path.turning import Turning
+from selfmotion.model.path.splines import Cubics, Turning
 
 # Key of quaternions in files.
 _IN_FILES = "quaternions"
@@ -249,15 +249,13 @@ class Waypoints(Path, kind="waypoints"):
         return np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
 
     @cached_property
-    def _sections(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Turning]]]:
+    def _sections(self) -> tuple[npt.NDArray[np.intp], list[tuple[Cubics, Turning]]]:
         """First waypoint of each piece between corners, and its (position, rotation) splines."""
-        from scipy.interpolate import CubicSpline
-
         bounds, splines = self._bounds, []
         for first, last in pairwise(bounds):
             part = slice(first, last + 1)
             t = self._t[part]
-            splines.append((CubicSpline(t, self._points[part]), Turning(t, self._turns[part])))
+            splines.append((Cubics(t, self._points[part]), Turning(t, self._turns[part])))
         return bounds[:-1], splines
 
     def _warp(self, t: Array) -> tuple[Array, Array]:
@@ -294,7 +292,7 @@ class Waypoints(Path, kind="waypoints"):
             here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(section == index)
             own = tau[here]
             if len(own):
-                position[here], twist[here, :3] = line(own), line(own, 1)
+                position[here], twist[here, :3] = line.at(own)
                 rotation[here], twist[here, 3:] = turned.at(own)
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
@@ -317,12 +315,13 @@ class Waypoints(Path, kind="waypoints"):
             here = section == index
             if not np.any(here):
                 continue
-            for spline, whole in zip((line, turned), found, strict=True):
-                part = series.of_pieces(spline.x, spline.c[::-1], at[here], reach[here])
-                bounds = series.of_vectors(part)
-                if whole is found.rotation:
-                    bounds = series.exponential(bounds)
-                whole[:, here] = series.composed(bounds, tau[:, here] / reach[here])
+            inner = tau[:, here] / reach[here]
+            moved, turns = (
+                series.of_vectors(series.of_pieces(x, c[::-1], at[here], reach[here]))
+                for x, c in ((line.x, line.c), (turned.x, turned.c))
+            )
+            found.translation[:, here] = series.composed(moved, inner)
+            found.rotation[:, here] = series.composed(series.exponential(turns), inner)
         return found
 
     @override

@@ -1,6 +1,5 @@
 """Majorant series of a chain's motion: bounds of all derivatives."""
 
-from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +38,7 @@ class ChainSeries:
     def turned(self) -> list[Array]:
         """The orientation of the world and of each joint's frame, (K + 1, I) each."""
         sums = [np.zeros_like(self.joints[0])]
-        for joint, parent, _ in self._links():
+        for joint, parent, _ in self._links:
             sums.append(sums[parent] + self._every[joint] * self._is_revolute[joint])
         return [series.exponential(total) for total in sums]
 
@@ -47,7 +46,7 @@ class ChainSeries:
     def steps(self) -> list[Array]:
         """From the parent's frame to each joint's, world axes [m]; of the world 0."""
         found = [np.zeros_like(self.joints[0])]
-        for joint, parent, length in self._links():
+        for joint, parent, length in self._links:
             step = length * self.turned[parent]
             if not self._is_revolute[joint]:
                 step = step + series.product(self._every[joint], self.turned[parent])
@@ -58,7 +57,7 @@ class ChainSeries:
     def places(self) -> list[Array]:
         """The places of the world and of each joint's frame [m]."""
         found = [self.steps[0]]
-        for joint, parent, _ in self._links():
+        for joint, parent, _ in self._links:
             found.append(found[parent] + self.steps[joint + 1])
         return found
 
@@ -66,7 +65,7 @@ class ChainSeries:
     def spins(self) -> list[Array]:
         """The angular velocities of the world and of each joint's frame [rad/s]."""
         found = [np.zeros_like(self.joints[0][1:])]
-        for joint, parent, _ in self._links():
+        for joint, parent, _ in self._links:
             spin = found[parent]
             if self._is_revolute[joint]:
                 spin = spin + series.product(self.rate(joint), self.turned[parent])
@@ -128,8 +127,7 @@ class ChainSeries:
                 total = total + self._every[joint]
         return np.asarray(spin)
 
-    def _links(self) -> Iterator[tuple[int, int, float]]:
-        """Return each joint with its parent and how far it is from there [m]."""
-        placements = list(self.robot.model.jointPlacements)[1:]
-        for joint, placement in enumerate(placements):
-            yield joint, self.parent(joint), float(np.linalg.norm(placement.translation))
+    @cached_property
+    def _links(self) -> list[tuple[int, int, float]]:
+        """Each joint with its parent and how far it is from there [m]."""
+        return [(joint, *link) for joint, link in enumerate(self.robot.links)]

@@ -127,6 +127,13 @@ class RobotModel:
         """Arrays of all joints for compiled kinematics, placed in the world."""
         return tree_arrays(self.model, self.coupling)
 
+    @cached_property
+    def links(self) -> list[tuple[int, float]]:
+        """Parent of each joint, 0 the world, else 1 + its number, and how far it is from it [m]."""
+        parents, places = list(self.model.parents)[1:], list(self.model.jointPlacements)[1:]
+        lengths = [float(np.linalg.norm(place.translation)) for place in places]
+        return list(zip(map(int, parents), lengths, strict=True))
+
     @property
     def is_revolute(self) -> Flags:
         """Which joints' coordinates are angles, (n,)."""

@@ -21,6 +21,7 @@ from selfmotion.model.task.relaxation import (
     Relaxation as Relaxation,
 )
 from selfmotion.model.task.rotation_vectors import (
+    exponential_coefficients as exponential_coefficients,
     exponentials as exponentials,
     products as products,
     rotation_vectors as rotation_vectors,

@@ -1,9 +1,11 @@
-"""Batched rotation vectors: logarithm, exponential and its angular velocity."""
+"""Rotation vectors of many rotations."""
+
+from math import cos, sin, sqrt
 
 import numpy as np
 from pinocchio import log3
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, called
 
 # Angle below which Taylor series replace the closed forms [rad]: the first omitted terms are below
 # 1e-12.
@@ -34,32 +36,32 @@ def exponentials(vectors: Array, rates: Array) -> tuple[Array, Array]:
 
     Jl(δ) = I + a [δ]× + b [δ]×² is the left Jacobian of SO(3).
     """
-    angle = _norms(vectors)
-    a, b = _exponential_coefficients(angle)
+    square = np.einsum("si,si->s", vectors, vectors)
+    a, b = np.transpose([exponential_coefficients(x) for x in square.tolist()])
     delta, outer = skews(vectors), vectors[:, :, None] * vectors[:, None, :]
     # sin θ / θ [δ]× + a [δ]×² + I, with [δ]×² = δδᵀ - θ² I.
-    sine, cosine = 1.0 - b * angle**2, 1.0 - a * angle**2
+    sine, cosine = 1.0 - b * square, 1.0 - a * square
     rotations = sine[:, None, None] * delta + a[:, None, None] * outer
     rotations.reshape(-1, 9)[:, ::4] += cosine[:, None]
     cross = products(delta, rates)
     return rotations, rates + a[:, None] * cross + b[:, None] * products(delta, cross)
 
 
-def _norms(vectors: Array) -> Array:
-    """Return the Euclidean norms of vectors (S, 3), (S,)."""
-    return np.asarray(np.sqrt(np.einsum("si,si->s", vectors, vectors)))
+@called
+def exponential_coefficients(square: float) -> tuple[float, float]:
+    """Return a = (1 - cos θ)/θ² and b = (θ - sin θ)/θ³, for θ²."""
+    if square < _SMALL_ANGLE**2:
+        return (
+            0.5 - square / 24.0 + square**2 / 720.0,
+            1.0 / 6.0 - square / 120.0 + square**2 / 5040.0,
+        )
+    angle = sqrt(square)
+    return (1.0 - cos(angle)) / square, (angle - sin(angle)) / (square * angle)
 
 
-def _exponential_coefficients(angle: Array) -> tuple[Array, Array]:
-    """Return a = (1 - cos θ)/θ² and b = (θ - sin θ)/θ³."""
-    small, square = angle < _SMALL_ANGLE, angle**2
-    safe = np.where(small, 1.0, angle)
-    a = (1.0 - np.cos(safe)) / safe**2
-    b = (safe - np.sin(safe)) / safe**3
-    return (
-        np.where(small, 0.5 - square / 24.0 + square**2 / 720.0, a),
-        np.where(small, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0, b),
-    )
+def products(matrices: Array, vectors: Array) -> Array:
+    """Return the products of matrices (S, 3, 3) and vectors (S, 3), (S, 3)."""
+    return np.asarray(np.einsum("sij,sj->si", matrices, vectors))
 
 
 def skews(vectors: Array) -> Array:
@@ -69,6 +71,6 @@ def skews(vectors: Array) -> Array:
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
-def products(matrices: Array, vectors: Array) -> Array:
-    """Return the products of matrices (S, 3, 3) and vectors (S, 3), (S, 3)."""
-    return np.asarray(np.einsum("sij,sj->si", matrices, vectors))
+def _norms(vectors: Array) -> Array:
+    """Return the Euclidean norms of vectors (S, 3), (S,)."""
+    return np.asarray(np.sqrt(np.einsum("si,si->s", vectors, vectors)))
