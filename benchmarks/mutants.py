@@ -104,7 +104,12 @@ PARTS = (
     ),
     Part(
         "rows",
-        ("planning/nodes/rows.py", "problem/constraints/conditions.py"),
+        (
+            "planning/nodes/rows.py",
+            "planning/nodes/limit_rows.py",
+            "planning/nodes/limit_kernels.py",
+            "problem/constraints/conditions.py",
+        ),
         (
             "nodes/test_rows.py",
             "constraints/test_conditions.py",
@@ -122,6 +127,7 @@ PARTS = (
         "newton",
         (
             "planning/nodes/newton.py",
+            "planning/nodes/newton_kernels.py",
             "planning/nodes/newton_system.py",
             "planning/nodes/settings.py",
             "planning/nodes/batch.py",

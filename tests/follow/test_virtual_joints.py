@@ -25,7 +25,6 @@ from selfmotion.planning.formulation import (
     BoundConditions,
     CurveSamples,
     Formulation,
-    SampledMotion,
     on_path,
     sampled,
     sampled_along,
@@ -36,7 +35,7 @@ from selfmotion.planning.nodes import NodeGrid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import AT_GAUSS
 from selfmotion.problem.constraints import DependsOn, NodeTangents
-from selfmotion.problem.costs import Samples
+from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, robot_named
 from support.nodes import around_of, centred, moved, nodes_of, random_step
 
@@ -366,8 +365,7 @@ def test_gradients_along_nodes_equal_central_differences(
     size = 1e-5
     here = centred(here)
     aims = [moved(here, side * direction).objective for side in (size, -size)]
-    slopes = here.grid.cost.slopes(here.sampled.arm, here.curve_ends, here.partials)
-    force = here.grid.spline.scattered(slopes)
+    force = here.grid.spline.scattered(here.slopes)
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()
@@ -392,11 +390,8 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
         every = CurveSamples(
             soft.follows, spline.sampling, lambda o: spline.at(AT_GAUSS, o, ends).reshape(-1, 8)
         )
-        motion = sampled(soft, every)
-        return float(spline.sampling.weights @ (cost.integrand(motion) - hard(motion)))
-
-    def hard(motion: SampledMotion) -> Array:
-        return np.sum([item.value(motion.arm) for item in soft.costs], axis=0)
+        hard = np.sum([item.value(sampled(soft, every).arm) for item in soft.costs], axis=0)
+        return float(cost.quadratic(ends).costs.sum() - spline.sampling.weights @ hard)
 
     # Being at a band all the time doubles a cost of 3.
     edge = np.zeros((6, 6, 8))
@@ -405,8 +400,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     samples = sampled(
         soft, CurveSamples(soft.follows, spline.sampling, lambda o: np.zeros((30, 8)))
     )
-    none = cost.partials(samples.arm)
-    slopes = cost.slopes(samples.arm, ends, none)[:, :, 7:]
+    slopes = cost.quadratic(ends).slopes[:, :, 7:]
     direction = np.zeros_like(ends)
     direction[:, :, 7] = rng.normal(size=(6, 6))
     exact = (value(ends + 1e-4 * direction) - value(ends - 1e-4 * direction)) / 2e-4
@@ -414,7 +408,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     nodes = np.zeros((7, 3, 8, 1))
     nodes[:, :, 7] = rng.normal(size=(7, 3, 1))
     by, matrix, step = spline.changes(nodes), NodeMatrix.zeros(7, 1), np.ones((7, 1))
-    cost.add_curvature(matrix, by, samples.arm, none)
+    cost.add_curvature(matrix, by, samples, Partials())
     bends = float(step.ravel() @ matrix.banded().dense() @ step.ravel())
     direction = by.along(step)
     sides = value(ends + direction) + value(ends - direction) - 2.0 * value(ends)

@@ -9,9 +9,10 @@ import selfmotion as sm
 from selfmotion.planning.nodes import NodeMotion, Step, minimise, newton, newton_system
 from selfmotion.planning.nodes.motion import moved_along
 from selfmotion.planning.nodes.newton import (
-    _complementarity_residual,
     _merit,
     _raise_merit_penalty,
+    _residuals,
+    _shorter,
     _Solver,
 )
 from selfmotion.planning.nodes.newton_system import Change, Model, System
@@ -23,6 +24,8 @@ from support.nodes import centred, moved, nodes_of, problem_of, random_step
 
 # A motion that is closed up to this at its last node [rad].
 OFF = 1e-3
+# A limit of speeds that binds and can be kept [rad/s].
+LOOSE = 1.3
 # Share of a step by which functions along it are differentiated.
 NEAR = 1e-5
 # Of such differences; of a quadratic form against the system without what is added to its diagonal.
@@ -48,6 +51,12 @@ def stepped(solver: _Solver) -> tuple[Model, Change]:
     system = solver._system(model)
     assert system is not None
     return model, solver._step(system)
+
+
+def system_of(solver: _Solver, model: Model) -> System:
+    found = System.of(solver.motion, model, solver._rows, solver._barrier, 0.0)
+    assert found is not None
+    return found
 
 
 def never(step: Step) -> bool:
@@ -78,10 +87,9 @@ def check_descent(solver: _Solver) -> float:
     def merit(share: float) -> float:
         motion = moved_along(solver.motion, share * step.nodes, model.around.changes)
         assert motion is not None
-        slacks, elastics = solver._slacks, solver._elastics
-        return _merit(
-            solver, motion, slacks + share * step.slacks, elastics + share * step.elastics
-        )
+        slacks = solver._slacks + share * step.slacks
+        elastics = solver._elastics + share * step.elastics
+        return _merit(solver, motion, motion.h[solver._active], slacks, elastics)
 
     def slope() -> float:
         return (merit(NEAR) - merit(0.0)) / NEAR
@@ -120,7 +128,7 @@ def test_what_a_step_promises_is_its_quadratic_form(panda: sm.RobotModel) -> Non
         assert solver.advance(never) is None
     model, step = stepped(solver)
     own = solver._rows
-    matrix = model.stiffened(own.of_all(own.stiff)).banded()
+    matrix = model.stiffened(own.of_all(system_of(solver, model).stiff)).banded()
     matrix.add(0, 0, model.around.curvature)
     flat = step.nodes.ravel()
     quadratic = float(flat @ matrix.dense() @ flat)
@@ -128,9 +136,7 @@ def test_what_a_step_promises_is_its_quadratic_form(panda: sm.RobotModel) -> Non
     assert solver._shift == 0.0
     assert step.promised == pytest.approx(quadratic, rel=DIAGONAL)
     # For another μ the same system has another step.
-    system = System.of(solver.motion, model, own, solver._barrier, 0.0)
-    assert system is not None
-    softer = system.step(30.0 * solver._barrier)
+    softer = system_of(solver, model).step(30.0 * solver._barrier)
     flat = softer.nodes.ravel()
     assert softer.promised == pytest.approx(float(flat @ matrix.dense() @ flat), rel=DIAGONAL)
 
@@ -170,7 +176,7 @@ def test_a_step_solves_the_linearised_conditions_of_an_optimum(
     matrix = model.curvature.banded()
     matrix.add(0, 0, model.around.curvature)
     after = solver._rows.of_all(multipliers + step.multipliers)
-    pulled = model.around.pulled(solver.motion.grid.spline.scattered(model.rows.pulled(after)))
+    pulled = model.by.pulled(model.rows.pulled(after))
     terms = [
         matrix.dense() @ step.nodes.ravel(),
         model.gradient.ravel(),
@@ -210,13 +216,13 @@ def test_products_are_as_far_from_the_barrier_as_the_farthest(panda: sm.RobotMod
         solver._multipliers = share * rho * ones
         solver._slacks = mu / solver._multipliers
         solver._elastics = mu / (rho - solver._multipliers)
-        assert _complementarity_residual(solver) <= SOLVED * mu
+        assert _residuals(solver)[1] <= SOLVED * mu
         for name in ("_slacks", "_elastics"):
             near = getattr(solver, name)
             for off in (-0.5, 3.0):
                 row = np.arange(len(near)) == 2
                 setattr(solver, name, near * (1.0 + off * row))
-                assert _complementarity_residual(solver) == pytest.approx(abs(off) * mu)
+                assert _residuals(solver)[1] == pytest.approx(abs(off) * mu)
             setattr(solver, name, near)
 
 
@@ -227,7 +233,7 @@ def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.Robot
     solver = _Solver(begin, known, SETTINGS.mu_first, roughly=False)
     h = solver._h
     assert h.min() < 0.0 < h.max()
-    np.testing.assert_allclose(solver._residuals, 0.0, atol=SOLVED)
+    np.testing.assert_allclose(h + solver._slacks - solver._elastics, 0.0, atol=SOLVED)
     first = SETTINGS.mu_warm / SETTINGS.mu_first * cold_barrier(begin)
     room = solver._elastics * (solver._rho - solver._multipliers)
     holds = -h >= first / solver._multipliers
@@ -311,6 +317,51 @@ def test_where_no_step_is_accepted_conditions_may_be_the_reason(
     )
     found = minimise(nodes_of(problem(panda, constraint, costs=[Uphill()]), 16), never)
     assert found.status is Status.INFEASIBLE
+
+
+def test_a_rejected_step_is_cut_to_the_least_of_its_parabola() -> None:
+    """Of 1 - s α + c α² the least is at s/(2c); of others as far as the bounds allow."""
+    for slope, curve in ((-1.0, 1.4), (-2.0, 3.0), (-0.3, 0.9)):
+        length = 1.0
+        gained = -(slope * length + curve * length**2)
+        least = -slope / (2.0 * curve)
+        assert SETTINGS.backtracking_least < least < SETTINGS.backtracking
+        assert _shorter(length, slope, gained) == pytest.approx(least, rel=1e-12)
+    assert _shorter(0.2, -1.0, -1e9) == pytest.approx(0.2 * SETTINGS.backtracking_least)
+    # It fell by almost as much as predicted, or rises from the start.
+    assert _shorter(0.2, -1.0, 0.19) == pytest.approx(0.2 * SETTINGS.backtracking)
+    assert _shorter(0.2, 1.0, -5.0) == pytest.approx(0.2 * SETTINGS.backtracking)
+
+
+def test_steps_that_lead_nowhere_are_given_up(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As soon as enough of them are short in a row; a longer one between them begins anew."""
+    short, long = 0.5 * SETTINGS.short_length, 2.0 * SETTINGS.short_length
+    count = SETTINGS.short_steps
+    wanted = [short] * (count - 1) + [long] + [short] * (2 * count)
+    taken: list[float] = []
+
+    def advance(solver: _Solver, callback: object) -> None:
+        taken.append(wanted[len(taken)])
+        solver._length = taken[-1]
+
+    monkeypatch.setattr(_Solver, "advance", advance)
+    found = minimise(nodes_of(problem(panda), 8), never)
+    assert found.status is Status.INFEASIBLE
+    assert len(taken) == 2 * count
+
+
+def test_from_a_neighbouring_optimum_the_finest_is_found(panda: sm.RobotModel) -> None:
+    """Where limits bind: a rough optimum has a larger last μ, one with multipliers has not."""
+    begin = nodes_of(problem(panda, sm.constraints.JointVelocityLimits(LOOSE)), 16)
+    rough = minimise(begin, never, roughly=True)
+    fine = minimise(rough.motion, never, rough.multipliers, roughly=True)
+    assert rough.status is fine.status is Status.CONVERGED
+    assert rough.multipliers.max() > SETTINGS.multiplier_floor * rough.motion.cost
+    assert rough.is_rough
+    assert not fine.is_rough
+    assert not minimise(begin, never).is_rough
 
 
 def test_settings_are_within_the_ranges_of_their_sources() -> None:

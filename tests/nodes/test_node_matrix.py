@@ -80,7 +80,7 @@ def products(case: Case) -> Array:
     sides = []
     for order in (0, 1):
         table = np.ascontiguousarray(AT_GAUSS[order])
-        sides.append(Points(table, case.spline.rates(order), case.rng.normal(size=shape)))
+        sides.append(Points(table, case.spline.rates[order], case.rng.normal(size=shape)))
     weights = case.rng.normal(size=shape[0])
     case.matrix.add_products(case.by, *sides, weights)
     found = np.zeros((len(case.by.nodes) * SIZE,) * 2)

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Counts
+from selfmotion.basics import Array, Counts
 from selfmotion.model.robot import has_masses
 from selfmotion.planning.formulation import with_springs
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective, on_grid
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
+from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, Case
 from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
 
@@ -30,8 +31,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
 
 def force_of(motion):
     """Return λ = ∂F/∂(q, q̇, q̈) of the nodes."""
-    slopes = motion.grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
-    return motion.grid.spline.scattered(slopes)
+    return motion.grid.spline.scattered(motion.slopes)
 
 
 def gradient(motion):
@@ -43,7 +43,7 @@ def matrix_of(motion) -> Banded:
     around = around_of(motion, force_of(motion))
     by = motion.grid.spline.changes(around.changes)
     curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
-    motion.grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
+    motion.grid.cost.add_curvature(curvature, by, motion.sampled, motion.partials)
     matrix = curvature.banded()
     matrix.add(0, 0, around.curvature)
     return matrix
@@ -181,4 +181,36 @@ def test_springs_of_tolerances_are_part_of_the_cost_and_its_derivatives(
 
 def summed(motion: NodeMotion) -> float:
     """Return the integral of all that is minimised of motions with springs."""
-    return float(motion.sampled.arm.weights @ motion.grid.cost.integrand(motion.sampled))
+    return float(motion.quadratic.costs.sum())
+
+
+class Doubled(sm.costs.JointVelocity):
+    """A cost of one's own that derives from a quadratic one, and is evaluated otherwise."""
+
+    def value(self, samples: Samples) -> Array:
+        return 2.0 * super().value(samples)
+
+    def gradient(self, samples: Samples) -> Partials:
+        return Partials(qd=2.0 * super().gradient(samples).qd)
+
+
+def test_what_derives_from_a_quadratic_cost_is_evaluated_as_it_says(case: Case) -> None:
+    """By its own value and gradient: the curvature of its base is another one's."""
+    once, twice = (
+        nodes_of(problem_of(case, costs=[cost])) for cost in (sm.costs.JointVelocity(), Doubled())
+    )
+    assert once.grid.cost.is_quadratic
+    assert not twice.grid.cost.is_quadratic
+    assert twice.cost == pytest.approx(2.0 * once.cost, rel=1e-12)
+    largest = np.abs(once.slopes).max()
+    np.testing.assert_allclose(twice.slopes, 2.0 * once.slopes, atol=1e-12 * largest)
+
+
+def test_costs_by_their_forms_are_those_by_their_samples(case: Case) -> None:
+    """Value and terms; also with a posture far away, and with joints that are coupled."""
+    coupled = np.eye(case[0].dof) + 0.2
+    costs = [*costs_of(case[0]), sm.costs.JointVelocity(coupled, name="coupled")]
+    motion = nodes_of(problem_of(case, costs=costs, rest=True))
+    motion = centred(moved(motion, random_step(motion, 1, 0.02)))
+    assert motion.grid.cost.is_quadratic
+    assert motion.cost == pytest.approx(sum(motion.terms.values()), rel=1e-12)

@@ -60,7 +60,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     kept = motion.h > -500.0
     change = ((above - below) / (2 * NEAR))[kept]
     changes = along(motion, around_of(motion).changes, step)
-    linear = rows.linearised(motion.checked, kept)
+    linear = rows.linearised(lambda: motion.checked, kept)
     scale = max(np.abs(change).max(), 1.0)
     # Distances of hulls to a sphere have slopes of their own accuracy.
     allowed = 1e-3 if name == "clearance" else DIFFERENCE
@@ -72,7 +72,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     assert pulled == pytest.approx(expected, abs=allowed * scale * kept.sum())
     # Those that do not count have no say.
     few = kept & (np.arange(len(kept)) % 3 == 0)
-    some = rows.linearised(motion.checked, few).along(changes)
+    some = rows.linearised(lambda: motion.checked, few).along(changes)
     np.testing.assert_allclose(some, linear.along(changes)[few[kept]], rtol=1e-12, atol=1e-12)
 
 
@@ -82,7 +82,7 @@ def test_squares_of_rows_are_the_sums_of_their_products(panda: sm.RobotModel, na
     step, kept = random_step(motion, 2), motion.h > -500.0
     around = around_of(motion)
     by = motion.grid.spline.changes(around.changes)
-    linear = motion.grid.rows.linearised(motion.checked, kept)
+    linear = motion.grid.rows.linearised(lambda: motion.checked, kept)
     weights = np.zeros(len(kept))
     weights[kept] = np.random.default_rng(4).uniform(size=kept.sum())
     matrix = NodeMatrix.zeros(*around.curvature.shape[:2])

@@ -121,7 +121,7 @@ def test_quickness_and_smoothing_are_decided_by_what_they_add() -> None:
     case = case_of("panda", "pose")
     resting = nodes_of(problem_of(case, rest=True))
     problem, samples = resting.grid.formulation, resting.sampled.arm
-    added = resting.grid.cost.roughness(resting.curve_ends)
+    added = float(resting.quadratic.smoothing.sum())
     most = added / smoothness._TOO_MUCH
     assert quickness(problem, samples, most * 1.001, 1.0) == 1.0
     assert quickness(problem, samples, most * 0.999, 1.0) < 1.0

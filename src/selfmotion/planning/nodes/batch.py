@@ -16,7 +16,6 @@ from selfmotion.planning.nodes.charts import Centred, Charts, Place
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion, stepped
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
-from selfmotion.planning.nodes.spline import GAUSS
 
 # A motion is finished when a step predicts less than this share of its cost.
 _ENOUGH = 1e-3
@@ -71,15 +70,14 @@ class Batch:
     @classmethod
     def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Batch":
         """Return the motions of nodes, with costs of those that go on evaluated."""
-        samples, grid, count = motion.sampled.arm, motion.grid, len(going)
+        grid, count = motion.grid, len(going)
         # This also checks the deadline.
         grid.counts.evaluated()
         grid.counts.evaluations += int(going.sum()) - 1
-        each = grid.cost.integrand(motion.sampled)
-        # In gaps, a cost may be infinite.
-        shares, counts = np.zeros_like(each), samples.weights > 0.0
-        shares[counts] = samples.weights[counts] * each[counts]
-        costs = np.append(shares.reshape(-1, len(GAUSS)).sum(axis=1), 0.0)
+        each = motion.quadratic.costs
+        if not grid.cost.is_quadratic:
+            each = each + grid.cost.bent(motion.sampled)
+        costs = np.append(each, 0.0)
         costs = costs.reshape(count, -1).sum(axis=1)
         return cls(motion, np.where(np.isfinite(costs), costs, np.inf), going, promised)
 
@@ -156,7 +154,7 @@ class Batch:
         grid.counts.gradients += self.count
         # A gap's slopes may be NaN.
         spline = grid.spline
-        slopes = grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
+        slopes = motion.slopes.copy()
         slopes[spline.gaps] = 0.0
         force = spline.scattered(slopes)
         around = LocalModel.of(
@@ -164,11 +162,11 @@ class Batch:
         )
         if around is None:
             raise RuntimeError(_LEAVES)
-        gradient = around.pulled(force)
+        by = spline.changes(around.changes)
+        gradient = by.pulled(slopes)
         gradient.reshape(-1)[grid.held] = 0.0
         curvature = NodeMatrix.zeros(*gradient.shape)
-        by = spline.changes(around.changes)
-        grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
+        grid.cost.add_curvature(curvature, by, motion.sampled, motion.partials)
         matrix = curvature.banded()
         matrix.add(0, 0, around.curvature)
         matrix.hold(grid.held)

@@ -167,6 +167,10 @@ class Manifolds:
     ----------
     path_accelerations : (N + 1, 6 F)
         ẍ of the paths.
+    held : (N + 1, n)
+        Which joints are held at 0.
+    holds : bool
+        Whether any is.
     """
 
     def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
@@ -181,6 +185,7 @@ class Manifolds:
             self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
             accelerations.append(item.twist_rates(t))
         self.held = np.tile(follows.held(t), (copies, 1))
+        self.holds = bool(self.held.any())
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
         self.path_accelerations = np.ascontiguousarray(
             np.tile(np.hstack(accelerations), (copies, 1))
@@ -188,6 +193,10 @@ class Manifolds:
 
     def table(self) -> Array:
         """Return a table that holds the paths alone."""
+        return self._table.copy()
+
+    @cached_property
+    def _table(self) -> Array:
         n, m, count = self._sizes
         table = np.zeros((len(self.t), kernels.columns(n, m, count)))
         for f, path in enumerate(self._paths):
@@ -248,7 +257,7 @@ class Manifolds:
         """
         n, m, _ = self._sizes
         none = np.zeros((len(q), n - m))
-        if self.held.any():
+        if self.holds:
             q, epsilon, a = (np.where(self.held, 0.0, x) for x in (q, epsilon, a))
             return Charts(self, q, self._bases(q)).centred(none, epsilon, a)
         bases = np.zeros((len(q), n, n - m))

@@ -29,12 +29,11 @@ class Border(NamedTuple):
     c: Array
     columns: Array
 
-    def met_by(self, solved: Array) -> tuple[Array, Array]:
+    def met_by(self, step: Array, moved: Array) -> tuple[Array, Array]:
         """Return the step that satisfies the linearised conditions, and their multipliers.
 
-        `solved` has the step without conditions, then the response to each column, side by side.
+        For the step without conditions, and the response to each column, side by side.
         """
-        step, moved = solved[:, 0], solved[:, 1:]
         if not len(self.c):
             return step, self.c
         turned = self.columns.T
@@ -62,7 +61,9 @@ class NodeEnds:
 
     def residuals(self, nodes: Array) -> Array:
         """Return c, (E,), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
-        found = [np.zeros(0)]
+        if not self._items:
+            return np.zeros(0)
+        found = []
         for item in self._items:
             for order in item.orders:
                 if item.target is None:

@@ -29,11 +29,10 @@ from selfmotion.model.kernels import (
     cross,
     dot,
     errors_and_rows,
-    finite,
+    evaluate_motion,
     gram,
     linear,
     plus,
-    respond,
     rows_of,
     select,
     solve_cholesky,
@@ -137,23 +136,6 @@ def _set_rows(at: Stage, system: Array, factor: Array) -> None:
 
 
 @inlined
-def evaluate_motion(
-    q: Array, row: Array, layout: Layout, rotations: Array, positions: Array, jacobians: Array
-) -> bool:
-    """Set q, all tips and q̇ of a row whose J, factor of JJᵀ and ε are set; whether q̇ is finite."""
-    n, m = len(q), rows_of(layout)
-    at = stage_of(row, n, m)
-    for j in range(n):
-        at.q[j] = q[j]
-    for f in range(layout.shape[0]):
-        tip = tip_of(row, f, n, m)
-        _write_tip(tip, rotations[f], positions[f], jacobians[f])
-        select(layout, f, tip.rotation, tip.command, at.y)
-    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
-    return finite(at.qd)
-
-
-@inlined
 def _begin(
     q: Array, reference: Array, basis: Array, coordinates: Array, before: Array, carries: bool
 ) -> None:
@@ -205,19 +187,6 @@ def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
             tangents[j, x] /= length
     for j in range(n):
         epsilon[j] -= rest[j]
-
-
-@inlined
-def _write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
-    """Write a tip's pose and Jacobian into the table; its command is its path's twist."""
-    for i in range(3):
-        tip.translation[i] = place[i]
-        for j in range(3):
-            tip.rotation[i, j] = turn[i, j]
-    for i in range(6):
-        tip.command[i] = tip.target_twist[i]
-        for j in range(six.shape[1]):
-            tip.jacobian[i, j] = six[i, j]
 
 
 @kernel

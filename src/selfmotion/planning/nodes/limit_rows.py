@@ -13,14 +13,10 @@ from selfmotion.planning.nodes.spline import (
 )
 from selfmotion.problem.constraints import BoundLimits, Multipliers
 
-# Rows become active where h is above this [units of h].
-_NEAR = -0.3
 # A limit with less room than this is in use [units of h].
 _USED = 0.01
 # A limit whose control point is this near to it binds there [units of h].
 _BINDS = 1e-3
-# h of control points that two intervals share, on one of the two: it never becomes active.
-_SHARED = -1e3
 # Shares of an interval at which the curve is compared with the control points.
 _FINE = unit_bases(np.linspace(0.0, 1.0, 17))
 
@@ -45,42 +41,12 @@ class ControlPointRows:
         """Return the rows on other nodes."""
         return ControlPointRows(spline, self.item, self._first)
 
-    def residuals(self, ends: Array) -> Array:
-        """Return h, minus the part of the tolerance that is used."""
-        h = self._at(AT_CONTROLS, ends)
-        if self.item.order < ORDERS - 1:
-            h[:-1, -1] = _SHARED
-        return h - self.item.granted
-
     def _at(self, tables: tuple[Array, ...], ends: Array) -> Array:
         """Return h by shares of all intervals, (N, P, 2, j)."""
         item = self.item
         limits = item.lower, item.upper, item.scale
-        rates, table = self._spline.rates(item.order), tables[item.order]
+        rates, table = self._spline.rates[item.order], tables[item.order]
         return _beyond(ends, table, rates, self.joints, *limits, item.margin)
-
-    def near(self, h: Array) -> Flags:
-        """Return the mask of nearly violated rows: all of a joint and side."""
-        column = (h > _NEAR).any(axis=(0, 1))
-        return np.asarray(column & (h > 0.5 * _SHARED))
-
-    def along(self, changes: Array) -> Array:
-        """Return ∂h of all rows along changes of y (N, 6, n)."""
-        item, none = self.item, np.zeros(len(self.joints))
-        rates, table = self._spline.rates(item.order), AT_CONTROLS[item.order]
-        return _beyond(changes, table, rates, self.joints, none, none, item.scale, 0.0)
-
-    def add_pulled(self, found: Array, multipliers: Array) -> None:
-        """Add Σ multipliers ∂h/∂y to that of all rows, (N, 6, n)."""
-        order = self.item.order
-        given = AT_CONTROLS[order], self._spline.rates(order), self.joints, self.item.scale
-        _add_pulled(np.ascontiguousarray(multipliers), *given, found)
-
-    def add_squared(self, found: Array, weights: Array) -> None:
-        """Add Σ weights ∂h ∂hᵀ by y of each of its joints to that of all, (N, n, 6, 6)."""
-        order = self.item.order
-        given = AT_CONTROLS[order], self._spline.rates(order), self.joints, self.item.scale
-        _add_squared(np.ascontiguousarray(weights), *given, found)
 
     def multipliers_of(self, multipliers: Array, ends: Array) -> Multipliers:
         """Return the multipliers in the order of time."""
@@ -156,37 +122,3 @@ def _beyond(
                 found[k, p, 0, j] = (x - upper[j]) / scale[j] + margin
                 found[k, p, 1, j] = (lower[j] - x) / scale[j] + margin
     return found
-
-
-@kernel
-def _add_pulled(
-    multipliers: Array, table: Array, rates: Array, joints: Ints, scale: Array, found: Array
-) -> None:
-    """Add Σ multipliers (N, P, 2, j) ∂h/∂y to `found` (N, 6, n)."""
-    count, places, _, size = multipliers.shape
-    for k in range(count):
-        for p in range(places):
-            for j in range(size):
-                by = multipliers[k, p, 0, j] - multipliers[k, p, 1, j]
-                if by != 0.0:
-                    by *= rates[k] / scale[j]
-                    for a in range(6):
-                        found[k, a, joints[j]] += table[p, a] * by
-
-
-@kernel
-def _add_squared(
-    weights: Array, table: Array, rates: Array, joints: Ints, scale: Array, found: Array
-) -> None:
-    """Add Σ weights (N, P, 2, j) ∂h ∂hᵀ by y of each joint to `found` (N, n, 6, 6)."""
-    count, places, _, size = weights.shape
-    for k in range(count):
-        for p in range(places):
-            for j in range(size):
-                by = weights[k, p, 0, j] + weights[k, p, 1, j]
-                if by != 0.0:
-                    by *= (rates[k] / scale[j]) ** 2
-                    for a in range(6):
-                        share = by * table[p, a]
-                        for b in range(6):
-                            found[k, joints[j], a, b] += share * table[p, b]

@@ -25,6 +25,7 @@ from selfmotion.model.kernels import (
     cholesky,
     clear_held,
     columns,
+    evaluate_motion,
     gram,
     rows_of,
     select,
@@ -39,7 +40,6 @@ from selfmotion.planning.nodes.charts import Charts, Place
 from selfmotion.planning.nodes.kernels import (
     accelerate,
     acceleration_slopes,
-    evaluate_motion,
     project,
     required_acceleration,
     turned,
@@ -102,12 +102,6 @@ class LocalModel:
             curvature,
         )
         return cls(changes, curvature) if failed < 0 or not own.is_whole else None
-
-    def pulled(self, force: Array) -> Array:
-        """Return Γᵀλ of the nodes, (N + 1, 3r), for λ (N + 1, 3, n)."""
-        count, _, n, size = self.changes.shape
-        flat = self.changes.reshape(count, 3 * n, size)
-        return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
 
 
 @cache

@@ -17,7 +17,7 @@ from selfmotion.planning.formulation import (
 from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.nodes.kernels import follow
-from selfmotion.planning.nodes.objective import NodeCost
+from selfmotion.planning.nodes.objective import NodeCost, Quadratic
 from selfmotion.planning.nodes.rows import NodeRows, is_tolerance, parts_wanted, sampled_curve
 from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
@@ -165,9 +165,8 @@ class NodeGrid:
 
     def around(self, charts: Charts, qd: Array, qdd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose rates are nearest to q̇ and q̈, or None."""
-        own = self.manifolds.held
-        if own.any():
-            q = np.where(own, 0.0, charts.q)
+        if self.manifolds.holds:
+            q = np.where(self.manifolds.held, 0.0, charts.q)
             charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
         none = np.zeros((len(qd), charts.bases.shape[2]))
         found = charts.centred(none, self.rested(qd, 1), self.rested(qdd, 2))
@@ -175,7 +174,8 @@ class NodeGrid:
 
     def rested(self, rates: Array, order: int) -> Array:
         """Return rates with those of resting ends and of held joints set to 0."""
-        found = np.where(self.manifolds.held, 0.0, rates)
+        own = self.manifolds
+        found = np.where(own.held, 0.0, rates) if own.holds else rates.copy()
         found[self._resting[order - 1]] = 0.0
         return found
 
@@ -248,30 +248,50 @@ class NodeMotion:
         return sampled(grid.formulation, every)
 
     @cached_property
+    def quadratic(self) -> Quadratic:
+        """What is quadratic in the ends of the intervals."""
+        return self.grid.cost.quadratic(self.curve_ends)
+
+    @cached_property
     def terms(self) -> dict[str, float]:
         """Contribution of each cost."""
-        self.grid.counts.evaluated()
         return self.grid.cost.terms(self.sampled.arm)
 
-    @property
+    @cached_property
     def cost(self) -> float:
         """F."""
-        return sum(self.terms.values())
+        self.grid.counts.evaluated()
+        total = float(self.quadratic.costs.sum())
+        if self.grid.cost.is_quadratic:
+            return total
+        return total + float(self.grid.cost.bent(self.sampled).sum())
 
     @cached_property
     def objective(self) -> float:
         """Objective of the optimisation: F and the smoothing."""
-        return self.cost + self.grid.cost.roughness(self.curve_ends)
+        return self.cost + float(self.quadratic.smoothing.sum())
 
     @cached_property
-    def partials(self) -> tuple[Partials, ...]:
-        """Derivatives of each cost's integrand at the samples."""
-        return self.grid.cost.partials(self.sampled.arm)
+    def partials(self) -> Partials:
+        """Derivatives of the integrands at the samples, of costs that are not quadratic."""
+        cost = self.grid.cost
+        return Partials() if cost.is_quadratic else cost.partials(self.sampled)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Derivatives of each interval's objective by its ends y, (N, 6, n)."""
+        cost, found = self.grid.cost, self.quadratic.slopes
+        if cost.is_quadratic:
+            return found
+        pushes = cost.bent_slopes(self.sampled, self.partials)
+        found = found.copy()
+        found[:, :, : pushes.shape[2]] += pushes
+        return found
 
     @cached_property
     def h(self) -> Array:
         """Residuals of all rows, (R,); half of each tolerance is used; see `NodeRows`."""
-        return self.grid.rows.residuals(self.checked, self.curve_ends)
+        return self.grid.rows.residuals(lambda: self.checked, self.curve_ends)
 
     @cached_property
     def c(self) -> Array:
@@ -395,7 +415,7 @@ def broken_intervals(motion: NodeMotion) -> Flags:
 
 def forget(motion: NodeMotion) -> None:
     """Drop cached values."""
-    for name in ("sampled", "checked", "partials", "h", "curve_ends"):
+    for name in ("sampled", "checked", "quadratic", "partials", "slopes", "h", "curve_ends"):
         motion.__dict__.pop(name, None)
 
 

@@ -18,8 +18,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, kernel
+from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.motion import NodeMotion, moved_along
+from selfmotion.planning.nodes.newton_kernels import (
+    largest_share,
+    merit_of_rows,
+    move_rows,
+    row_residuals,
+    slope_of_rows,
+)
 from selfmotion.planning.nodes.newton_system import Change, ElasticRows, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
@@ -60,6 +67,8 @@ class Optimum:
         Predicted decrease of the cost by another step.
     end_multipliers : (E,)
         Of the conditions on the ends.
+    is_rough : bool
+        Whether it is within the loose tolerances alone.
     """
 
     motion: NodeMotion
@@ -67,6 +76,7 @@ class Optimum:
     status: Status
     promised: float
     end_multipliers: Array
+    is_rough: bool
 
 
 def minimise(
@@ -94,11 +104,14 @@ def minimise(
         First barrier parameter without multipliers, in the unit of `NewtonSettings.mu_first`.
     """
     solver = _Solver(start, multipliers, mu_first, roughly=roughly)
-    smallest, stalled = np.inf, 0
+    smallest, stalled, short = np.inf, 0, 0
     for _ in range(max_iterations):
         status = solver.advance(callback)
         if status is not None:
             return solver.optimum(status)
+        short = short + 1 if solver.length < SETTINGS.short_length else 0
+        if short == SETTINGS.short_steps:
+            return solver.optimum(Status.INFEASIBLE)
         violation, stalled = solver.motion.violation, stalled + 1
         falls = violation < SETTINGS.stall_factor * smallest
         if falls or violation <= SETTINGS.gauss_newton_violation:
@@ -118,10 +131,15 @@ class _Solver:
         self, start: NodeMotion, multipliers: Array | None, mu_first: float, *, roughly: bool
     ) -> None:
         self.motion, h = start, start.h
+        # Of the active rows, (K,).
+        self._h = np.zeros(0)
         self._cost_scale = max(abs(start.objective), np.finfo(float).tiny)
         each = self._cost_scale / max(int((h > -1e2).sum()), 1)
-        self._rough, last = roughly, SETTINGS.mu_warm if roughly else SETTINGS.mu_last
-        self._last_barrier, self._rho = last * each, SETTINGS.rho * self._cost_scale
+        self._looseness = SETTINGS.rough_factor if roughly else 1.0
+        self._finest_barrier, self._rho = SETTINGS.mu_last * each, SETTINGS.rho * self._cost_scale
+        # From the multipliers of a neighbouring optimum, the finest is as near.
+        ends_early = roughly and (multipliers is None or not multipliers.any())
+        self._last_barrier = SETTINGS.mu_warm * each if ends_early else self._finest_barrier
         self._barrier = (mu_first if multipliers is None else SETTINGS.mu_warm) * each
         self._rho_updates = 0
         self._active: Flags = np.zeros(len(h), dtype=np.bool_)
@@ -133,30 +151,27 @@ class _Solver:
         self._end_multipliers = np.zeros(start.grid.ends.count)
         self._multiplier_change = np.inf if self._multipliers.size else 0.0
 
-    @property
-    def _h(self) -> Array:
-        """Active rows, (K,)."""
-        return self.motion.h[self._active]
-
-    @property
-    def _residuals(self) -> Array:
-        return self._h + self._slacks - self._elastics
-
     def _update_active_set(self) -> None:
         """Add rows that are near to being violated to the active set."""
         motion = self.motion
-        near = motion.grid.rows.near(motion.h) | self._active
-        if near.sum() == self._active.sum():
-            return
         x = motion.h
+        near = motion.grid.rows.near(x) | self._active
+        if np.count_nonzero(near) == len(self._slacks):
+            self._h = x[self._active]
+            return
         slacks = np.maximum(-x, SETTINGS.min_slack) + SETTINGS.first_elastic
         full = slacks, x + slacks, np.minimum(self._barrier / slacks, 0.5 * self._rho)
         for values, own in zip(
             full, (self._slacks, self._elastics, self._multipliers), strict=True
         ):
             values[self._active] = own
-        self._active = near
+        self._active, self._h = near, x[near]
         self._slacks, self._elastics, self._multipliers = (values[near] for values in full)
+
+    @property
+    def length(self) -> float:
+        """Accepted share of the last step."""
+        return self._length
 
     def optimum(self, status: Status) -> Optimum:
         """Return the iterate as a result."""
@@ -166,6 +181,7 @@ class _Solver:
             status,
             self._predicted,
             self._end_multipliers,
+            not self._is_fine,
         )
 
     def advance(self, callback: Callback) -> Status | None:
@@ -186,7 +202,7 @@ class _Solver:
             step = self._step(system)
             last = self._is_last_barrier
             self._multiplier_change = _relative_change(self, step.multipliers)
-            converged = last and _is_converged(self)
+            converged = last and _is_converged(self, self._looseness)
             converged &= self._multiplier_change <= SETTINGS.multiplier_tolerance
             if (converged or _is_barrier_solved(self)) and _raise_rho(self):
                 system = self._system(model)
@@ -207,6 +223,12 @@ class _Solver:
     def _is_last_barrier(self) -> bool:
         """Whether μ does not fall any more; without active rows there is no barrier."""
         return not self._multipliers.size or self._barrier <= self._last_barrier
+
+    @property
+    def _is_fine(self) -> bool:
+        """Whether the iterate is within the tightest tolerances."""
+        is_low = not self._multipliers.size or self._barrier <= self._finest_barrier
+        return is_low and _is_converged(self, 1.0)
 
     @property
     def _rows(self) -> ElasticRows:
@@ -241,7 +263,7 @@ class _Solver:
         if self._multiplier_change > np.sqrt(SETTINGS.multiplier_tolerance):
             return False
         before, self._predicted = self._predicted, promised**2 * self._cost_scale
-        if _is_converged(self):
+        if _is_converged(self, self._looseness):
             return True
         self._predicted = before
         return False
@@ -250,21 +272,21 @@ class _Solver:
         """Take a step as far as a backtracking line search on the merit function allows."""
         motion, r = self.motion, step.nodes.shape[1] // 3
         promise = _raise_merit_penalty(self, model, step)
-        merit = _merit(self, motion, self._slacks, self._elastics)
+        merit = _merit(self, motion, self._h, self._slacks, self._elastics)
         largest = float(np.abs(step.nodes[:, :r]).max())
         length = SETTINGS.max_change / max(largest, SETTINGS.max_change)
         for values, change in ((self._slacks, step.slacks), (self._elastics, step.elastics)):
             length = min(length, _to_boundary(values, change))
+        is_opposed, tried = False, 0
         while length >= SETTINGS.min_length:
+            tried += 1
             new = moved_along(motion, length * step.nodes, model.around.changes)
             if new is not None and np.isfinite(new.objective):
-                elastics = self._elastics + length * step.elastics
-                # A gap below 0 closes for nothing; one above costs the penalty, not ρ: else the
-                # rows' curvature stops the steps.
-                slacks = np.maximum(
-                    self._slacks + length * step.slacks, elastics - new.h[self._active]
-                )
-                gained = merit - _merit(self, new, slacks, elastics)
+                moved = np.empty((2, len(self._slacks)))
+                h = new.h[self._active]
+                given = h, self._slacks, self._elastics, step.slacks, step.elastics
+                move_rows(*given, length, moved)
+                gained = merit - _merit(self, new, h, *moved)
                 # Written so that NaN is rejected; 1e-13 is rounding of the merit.
                 if gained >= -SETTINGS.armijo * length * min(promise, 0.0) - 1e-13 * abs(merit):
                     share = min(
@@ -272,17 +294,38 @@ class _Solver:
                         _to_boundary(self._rho - self._multipliers, -step.multipliers),
                     )
                     self._multipliers = self._multipliers + share * step.multipliers
-                    self._slacks, self._elastics = slacks, elastics
+                    self._slacks, self._elastics = moved
                     self.motion, self._length = new, length
                     self._end_multipliers = step.end_multipliers
                     self._update_active_set()
                     return None
-            length *= SETTINGS.backtracking
-        if self._predicted <= SETTINGS.rounding * self._cost_scale:
-            return Status.PRECISION
-        # A large predicted decrease that no step has: the gradient is wrong, or rows conflict.
+                if abs(gained) > SETTINGS.visible * abs(merit):
+                    is_opposed = gained < 0.5 * length * promise
+                # The kinks of the penalty are no parabola: most steps are cut once or twice.
+                is_far = tried > SETTINGS.halvings
+                length = (
+                    _shorter(length, promise, gained) if is_far else SETTINGS.backtracking * length
+                )
+            else:
+                length *= SETTINGS.backtracking
         conditions = self._multipliers.size or len(self._end_multipliers)
+        is_rounding = self._predicted <= SETTINGS.rounding * self._cost_scale
+        if is_rounding and (conditions or not is_opposed):
+            return Status.PRECISION
+        # A large predicted decrease that no step has, or a rise in place of one: the gradient is
+        # wrong, or rows conflict.
         return Status.INFEASIBLE if conditions else Status.GRADIENT
+
+
+def _shorter(length: float, slope: float, gained: float) -> float:
+    """Return the length to try after one that is rejected.
+
+    Of the parabola through what the merit function is and how steep it falls at the start, and what
+    it `gained` there, as far as it is within bounds [NW 3.5].
+    """
+    bent = -gained - slope * length
+    least = -0.5 * slope * length**2 / bent if bent > 0.0 > slope else np.inf
+    return max(SETTINGS.backtracking_least * length, min(SETTINGS.backtracking * length, least))
 
 
 def _warm_start(solver: _Solver, multipliers: Array) -> None:
@@ -318,39 +361,33 @@ def _relative_change(solver: _Solver, step: Array) -> float:
     return float(np.abs(step).sum()) / known
 
 
-def _is_converged(solver: _Solver) -> bool:
-    """Whether residuals and predicted decrease are within the tolerances."""
+def _is_converged(solver: _Solver, looseness: float) -> bool:
+    """Whether residuals and predicted decrease are within the tolerances, or a multiple of them."""
     with_rows = solver._multipliers.size > 0
     tolerance = SETTINGS.cost_tolerance_with_rows if with_rows else SETTINGS.cost_tolerance
-    tolerance *= solver._cost_scale
-    factor = SETTINGS.rough_factor if solver._rough else 1.0
-    tolerance *= factor
-    met = _primal_residual(solver) <= SETTINGS.row_tolerance * factor
-    met &= bool(np.abs(solver.motion.c).max(initial=0.0) <= SETTINGS.end_tolerance)
-    met &= _complementarity_residual(solver) <= SETTINGS.complementarity * solver._barrier
-    return bool(met and solver._predicted <= tolerance)
+    tolerance *= solver._cost_scale * looseness
+    if not solver._predicted <= tolerance:
+        return False
+    primal, complementary = _residuals(solver)
+    met = primal <= SETTINGS.row_tolerance * looseness
+    met &= complementary <= SETTINGS.complementarity * solver._barrier
+    return bool(met and np.abs(solver.motion.c).max(initial=0.0) <= SETTINGS.end_tolerance)
 
 
 def _is_barrier_solved(solver: _Solver) -> bool:
     """Whether the barrier problem is solved to κ_ε μ."""
     allowed = SETTINGS.kappa_epsilon * solver._barrier
-    met = _primal_residual(solver) <= SETTINGS.barrier_row_tolerance
-    met &= _complementarity_residual(solver) <= allowed
-    return bool(met and solver._predicted <= allowed)
+    if not solver._predicted <= allowed:
+        return False
+    primal, complementary = _residuals(solver)
+    return bool(primal <= SETTINGS.barrier_row_tolerance and complementary <= allowed)
 
 
-def _primal_residual(solver: _Solver) -> float:
-    """Largest primal residual |h + s - e| of rows with a multiplier that matters."""
-    gap = np.abs(solver._residuals)
-    matters = solver._multipliers * gap > SETTINGS.inactive_share * solver._barrier
-    return float(gap[matters].max(initial=0.0))
-
-
-def _complementarity_residual(solver: _Solver) -> float:
-    """Largest |s λ - μ| and |e (ρ - λ) - μ|."""
-    by_slack = np.abs(solver._slacks * solver._multipliers - solver._barrier).max(initial=0.0)
-    room = solver._elastics * (solver._rho - solver._multipliers)
-    return float(max(by_slack, np.abs(room - solver._barrier).max(initial=0.0)))
+def _residuals(solver: _Solver) -> tuple[float, float]:
+    """Return the largest primal residual of rows that matter, and that of complementarity."""
+    barrier = solver._barrier
+    rows = solver._h, solver._slacks, solver._elastics, solver._multipliers
+    return row_residuals(*rows, solver._rho, barrier, SETTINGS.inactive_share * barrier)
 
 
 def _raise_merit_penalty(solver: _Solver, model: Model, step: Change) -> float:
@@ -359,13 +396,10 @@ def _raise_merit_penalty(solver: _Solver, model: Model, step: Change) -> float:
     Along Newton's step residuals close to first order, so that the derivative is that of cost and
     barrier terms minus ν times all residuals, with the penalty ν [NW 18.36].
     """
-    slope = float((model.gradient * step.nodes).sum()) + float(
-        np.sum(
-            (solver._rho - solver._barrier / solver._elastics) * step.elastics
-            - solver._barrier / solver._slacks * step.slacks
-        )
-    )
-    gap = float(np.abs(solver.motion.c).sum() + np.abs(solver._residuals).sum())
+    rows = solver._h, solver._slacks, solver._elastics, step.slacks, step.elastics
+    by_rows, gap = slope_of_rows(*rows, solver._rho, solver._barrier)
+    slope = float(np.vdot(model.gradient, step.nodes)) + by_rows
+    gap += float(np.abs(solver.motion.c).sum())
     if gap > 0.0:
         dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
         solver._merit_penalty = max(solver._merit_penalty, 2.0 * slope / gap, dearest)
@@ -373,23 +407,13 @@ def _raise_merit_penalty(solver: _Solver, model: Model, step: Change) -> float:
     return slope - solver._merit_penalty * gap
 
 
-def _merit(solver: _Solver, motion: NodeMotion, slacks: Array, elastics: Array) -> float:
-    barrier = solver._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
-    gap = np.abs(motion.h[solver._active] + slacks - elastics).sum() + np.abs(motion.c).sum()
-    elastic = solver._rho * float(elastics.sum())
-    return motion.objective + elastic - barrier + solver._merit_penalty * float(gap)
+def _merit(solver: _Solver, motion: NodeMotion, h: Array, slacks: Array, elastics: Array) -> float:
+    penalty = solver._merit_penalty
+    rows = merit_of_rows(h, slacks, elastics, solver._rho, solver._barrier, penalty)
+    return motion.objective + rows + penalty * float(np.abs(motion.c).sum())
 
 
 def _to_boundary(values: Array, step: Array) -> float:
     """Return the largest share of a step, at most 1, by the fraction-to-the-boundary rule."""
     # Without compilation the kernel returns a scalar of NumPy.
-    return float(_largest_share(values, step, SETTINGS.tau))
-
-
-@kernel
-def _largest_share(values: Array, step: Array, tau: float) -> float:
-    share = 1.0
-    for k in range(len(values)):
-        if step[k] < 0.0:
-            share = min(share, -tau * values[k] / step[k])
-    return share
+    return float(largest_share(values, step, SETTINGS.tau))

@@ -12,6 +12,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.ends import Border
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeMotion, breaks_hard
+from selfmotion.planning.nodes.newton_kernels import eliminate, step_rows
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.rows import LinearRows
 from selfmotion.planning.nodes.settings import SETTINGS
@@ -39,14 +40,9 @@ class ElasticRows(NamedTuple):
     active: Flags
 
     @property
-    def left(self) -> Array:
-        """ρ - λ, (K,)."""
-        return self.price - self.multipliers
-
-    @property
-    def stiff(self) -> Array:
-        """∂λ/∂h once steps of s and e are eliminated, (K,)."""
-        return 1.0 / (self.slacks / self.multipliers + self.elastics / self.left)
+    def unknowns(self) -> tuple[Array, Array, Array, Array, float]:
+        """Rows and unknowns as kernels take them: h, s, e, λ and ρ."""
+        return self.h, self.slacks, self.elastics, self.multipliers, self.price
 
     def of_all(self, own: Array) -> Array:
         """Return values of active rows, (K,), among those of all rows, (R,)."""
@@ -87,9 +83,8 @@ class Model(NamedTuple):
         """
         grid, spline = motion.grid, motion.grid.spline
         grid.counts.gradients += 1
-        slopes = grid.cost.slopes(motion.sampled.arm, motion.curve_ends, motion.partials)
-        by_cost = spline.scattered(slopes)
-        rows = grid.rows.linearised(motion.checked, own.active)
+        by_cost = spline.scattered(motion.slopes)
+        rows = grid.rows.linearised(lambda: motion.checked, own.active)
         force, multipliers = by_cost, own.of_all(own.multipliers)
         wild = float(np.max(own.h, initial=0.0)) > SETTINGS.gauss_newton_violation
         if not wild and own.multipliers.size:
@@ -103,14 +98,14 @@ class Model(NamedTuple):
             return None
         by = spline.changes(around.changes)
         curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
-        grid.cost.add_curvature(curvature, by, motion.sampled.arm, motion.partials)
+        grid.cost.add_curvature(curvature, by, motion.sampled, motion.partials)
         # Sums of squares keep their curvature however far they are violated; those of tolerances
         # only while other rows hold.
         without = wild and breaks_hard(motion, SETTINGS.gauss_newton_violation)
         grid.rows.add_bending(
-            curvature, by, motion.checked, multipliers, without_tolerances=without
+            curvature, by, lambda: motion.checked, multipliers, without_tolerances=without
         )
-        gradient = around.pulled(by_cost)
+        gradient = by.pulled(motion.slopes)
         gradient.reshape(-1)[grid.held] = 0.0
         border = grid.ends.border(motion.c, around.changes, grid.held)
         return cls(gradient, by, around, curvature, rows, border)
@@ -142,6 +137,8 @@ class System(NamedTuple):
     own : ElasticRows
     right : (2, (N + 1) 3r)
         Right sides with their sign changed: without barrier, and per unit of μ.
+    stiff : (K,)
+        ∂λ/∂h once steps of s and e are eliminated.
     solved : ((N + 1) 3r, 2 + E)
         Solutions for both right sides, and for the columns of the border.
     shift : float
@@ -151,6 +148,7 @@ class System(NamedTuple):
     model: Model
     own: ElasticRows
     right: Array
+    stiff: Array
     solved: Array
     shift: float
 
@@ -164,38 +162,35 @@ class System(NamedTuple):
         """
         grid, multipliers = motion.grid, own.multipliers
         gradient, stiffened = model.gradient, model.curvature
-        right = np.stack([gradient.ravel(), np.zeros(gradient.size)])
+        right, stiff = np.zeros((2, gradient.size)), np.empty(len(multipliers))
+        right[0] = gradient.ravel()
         if multipliers.size:
-            stiff = own.stiff
-            by_barrier = stiff * (1.0 / multipliers - 1.0 / own.left)
-            for k, pulls in enumerate((multipliers + stiff * own.h, by_barrier)):
-                push = model.rows.pulled(own.of_all(pulls))
-                pulled = model.around.pulled(grid.spline.scattered(push))
-                pulled.reshape(-1)[grid.held] = 0.0
-                right[k] += pulled.ravel()
+            pulls = np.empty((2, len(multipliers)))
+            eliminate(*own.unknowns, stiff, pulls)
+            for each, pull in zip(right, pulls, strict=True):
+                pulled = model.by.pulled(model.rows.pulled(own.of_all(pull))).ravel()
+                pulled[grid.held] = 0.0
+                each += pulled
             stiffened = model.stiffened(own.of_all(stiff))
         found = _solved(motion, model, stiffened, right, barrier, shift)
-        return None if found is None else cls(model, own, right, *found)
+        return None if found is None else cls(model, own, right, stiff, *found)
 
     def step(self, barrier: float) -> Change:
         """Return Newton's step of all unknowns for a μ."""
         own, model = self.own, self.model
-        slacks, elastics, multipliers, left = own.slacks, own.elastics, own.multipliers, own.left
         step, end_multipliers = _nodes_of(model, self.solved, barrier)
         right = self.right[0] + barrier * self.right[1]
         promised = float(-(right + model.border.columns @ end_multipliers) @ step)
         nodes = step.reshape(model.gradient.shape)
-        off = own.h + barrier / multipliers - barrier / left
-        by_multipliers = own.stiff * (model.rows.along(model.by.along(nodes)) + off)
-        by_slacks = barrier / multipliers - slacks - slacks / multipliers * by_multipliers
-        by_elastics = barrier / left - elastics + elastics / left * by_multipliers
-        return Change(nodes, by_slacks, by_elastics, by_multipliers, end_multipliers, promised)
+        along, steps = model.rows.along(model.by.along(nodes)), np.empty((3, len(self.stiff)))
+        step_rows(*own.unknowns, barrier, self.stiff, along, steps)
+        return Change(nodes, steps[0], steps[1], steps[2], end_multipliers, promised)
 
 
 def _nodes_of(model: Model, solved: Array, barrier: float) -> tuple[Array, Array]:
     """Return the step of the nodes for a μ, and the multipliers of the ends."""
     own = solved[:, 0] + barrier * solved[:, 1]
-    return model.border.met_by(np.column_stack([own, solved[:, 2:]]))
+    return model.border.met_by(own, solved[:, 2:])
 
 
 def _solved(
@@ -213,7 +208,8 @@ def _solved(
     curved, count = model.around.curvature, len(model.gradient)
     largest = float(np.abs(curved).max() + max(np.abs(part).max() for part in stiffened))
     diagonals = np.abs(np.diagonal(stiffened.nodes, axis1=1, axis2=2)).ravel()
-    usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
+    middle = len(diagonals) // 2
+    usual = float(np.partition(diagonals, middle)[middle])
     flat, shift, bounds = SETTINGS.flat_share / count**2 * usual, 0.0, np.zeros(0)
     columns = np.column_stack([-right.T, model.border.columns])
     while flat <= SETTINGS.delta_max * largest and shift <= SETTINGS.delta_max:

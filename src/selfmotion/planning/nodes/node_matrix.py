@@ -29,9 +29,16 @@ class EndChanges(NamedTuple):
 
     def along(self, step: Array) -> Array:
         """Return the change of y, (N, 6, n), along a step of the nodes (N + 1, d)."""
-        count, _, n, size = self.nodes.shape
-        moved = (self.nodes.reshape(count, 3 * n, size) @ step[:, :, None]).reshape(count, 3, n)
-        return np.asarray(np.concatenate([moved[:-1], moved[1:]], axis=1) * self.powers[:, :, None])
+        found = np.empty((len(self.powers), 6, self.nodes.shape[2]))
+        _change_ends(self.nodes, self.powers, step, found)
+        return found
+
+    def pulled(self, by_ends: Array) -> Array:
+        """Return derivatives by w of all nodes, (N + 1, d), for those by y, (N, 6, n)."""
+        count, _, _, size = self.nodes.shape
+        found = np.zeros((count, size))
+        _pull_ends(self.nodes, self.powers, by_ends, found)
+        return found
 
 
 class Points(NamedTuple):
@@ -98,6 +105,35 @@ class NodeMatrix(NamedTuple):
     def add_products(self, by: EndChanges, left: Points, right: Points, weights: Array) -> None:
         """Add the symmetric part of Σ weights leftᵀ right, for weights (N P,)."""
         _add_products(*self, *by, *left, *right, weights)
+
+
+@kernel
+def _change_ends(nodes: Array, powers: Array, step: Array, found: Array) -> None:
+    _, _, n, size = nodes.shape
+    for k in range(len(powers)):
+        for a in range(2):
+            for o in range(3):
+                for j in range(n):
+                    total = 0.0
+                    for x in range(size):
+                        total += nodes[k + a, o, j, x] * step[k + a, x]
+                    found[k, 3 * a + o, j] = powers[k, 3 * a + o] * total
+
+
+@kernel
+def _pull_ends(nodes: Array, powers: Array, by_ends: Array, found: Array) -> None:
+    _, _, n, size = nodes.shape
+    for k in range(len(powers)):
+        # Derivatives in gaps may be NaN.
+        if powers[k, 0] == 0.0:
+            continue
+        for a in range(2):
+            for o in range(3):
+                for j in range(n):
+                    by = powers[k, 3 * a + o] * by_ends[k, 3 * a + o, j]
+                    if by != 0.0:
+                        for x in range(size):
+                            found[k + a, x] += by * nodes[k + a, o, j, x]
 
 
 @kernel

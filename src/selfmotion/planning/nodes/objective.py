@@ -14,17 +14,18 @@ manifold, and of what is linear or quadratic in ν and α.
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, kernel
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import Formulation, SampledMotion
 from selfmotion.planning.nodes.charts import orthonormal
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix, Points
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
-from selfmotion.problem.costs import Partials, PlacedLater, Samples
+from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples, is_quadratic_form
 
 # Step of one-sided differences of costs' gradients [rad, m and their rates]: this matrix need not
 # be exact.
@@ -33,6 +34,45 @@ _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
 # Samples, or nodes, that are evaluated in one pass, of several directions.
 _TOGETHER = 4096
+
+
+class _Form(NamedTuple):
+    """A quadratic form ½ Σ K_ab y_aᵀWy_b of the ends y of each interval.
+
+    Attributes
+    ----------
+    stiffness : (N, 6, 6)
+        K.
+    weight : (n, n)
+        W.
+    is_smoothing : bool
+        Whether it is none of a cost.
+    """
+
+    stiffness: Array
+    weight: Array
+    is_smoothing: bool = False
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether it couples no joints."""
+        return np.array_equal(self.weight, np.diag(np.diagonal(self.weight)))
+
+
+class Quadratic(NamedTuple):
+    """What is quadratic in the ends y of each interval.
+
+    Attributes
+    ----------
+    costs, smoothing : (N,)
+        Values, by interval.
+    slopes : (N, 6, n)
+        Derivatives of their sum by y.
+    """
+
+    costs: Array
+    smoothing: Array
+    slopes: Array
 
 
 class NodeCost:
@@ -57,105 +97,143 @@ class NodeCost:
     ) -> None:
         self._spline, self._costs = spline, formulation.costs
         self._springs = formulation.springs
-        self._bent = tuple(cost for cost in self._costs if not cost.is_quadratic)
+        self._bent = tuple(cost for cost in self._costs if not is_quadratic_form(cost))
         self._dof, self._follows = formulation.robot.dof, formulation.problem.follows
         self._follows_dof = formulation.follows.dof
-        self._smoothing: tuple[Array, Array] | None = None
+        self._smoothing: list[_Form] = []
         if smoothing is not None:
             each = [self._stiffness(order, b) for order, b in smoothing.shares.items()]
-            self._smoothing = np.sum(each, axis=0), smoothing.weight
+            self._smoothing = [_Form(np.sum(each, axis=0), smoothing.weight, True)]
 
     @cached_property
-    def _joint_forms(self) -> Array:
-        """Second derivatives of all that is quadratic in each coordinate, (N, n, 6, 6) by its y."""
-        n, dof = self._dof, self._follows_dof
-        found = np.zeros((self._spline.count, dof, 6, 6))
-        for stiffness, weight in self._forms:
-            if _is_diagonal(weight):
-                found[:, :n] += np.diagonal(weight)[:, None, None] * stiffness[:, None]
-        if self._springs is not None:
-            found[:, n:] += self._springs[:, None, None] * self._stiffness(0)[:, None]
-        return found
-
-    @cached_property
-    def _coupled_forms(self) -> list[tuple[Array, Array]]:
-        """K and W of what is quadratic in several joints together."""
+    def _forms(self) -> list[_Form]:
+        """What is quadratic in the arm's joints, of costs."""
         return [
-            (stiffness, np.array(weight, order="C"))
-            for stiffness, weight in self._forms
-            if not _is_diagonal(weight)
+            _Form(self._stiffness(order), np.array(weight, order="C"))
+            for cost in self._costs
+            if is_quadratic_form(cost)
+            for order, weight in cost.curvature(self._dof).items()
         ]
 
     @cached_property
-    def _forms(self) -> list[tuple[Array, Array]]:
-        """K and W of all that is quadratic in the arm's joints, see `_stiffness`."""
-        found = [] if self._smoothing is None else [self._smoothing]
-        for cost in (cost for cost in self._costs if cost.is_quadratic):
-            for order, weight in cost.curvature(self._dof).items():
-                found.append((self._stiffness(order), weight))
+    def _cost_forms(self) -> Array:
+        """Second derivatives of costs that are quadratic in each coordinate, (N, n, 6, 6) by y."""
+        found = self._of_each_joint(self._forms)
+        if self._springs is not None:
+            own = found[:, self._dof :]
+            own += self._springs[:, None, None] * self._stiffness(0)[:, None]
+        return found
+
+    @cached_property
+    def _smoothing_forms(self) -> Array:
+        """The same of the smoothing."""
+        return self._of_each_joint(self._smoothing)
+
+    @cached_property
+    def _joint_forms(self) -> Array:
+        """The same of both."""
+        return self._cost_forms + self._smoothing_forms
+
+    @cached_property
+    def _coupled(self) -> list[_Form]:
+        """The forms of both that couple joints."""
+        return [form for form in (*self._smoothing, *self._forms) if not form.is_diagonal]
+
+    def _of_each_joint(self, forms: Sequence[_Form]) -> Array:
+        """Return the sum of forms that couple no joints, (N, n, 6, 6)."""
+        found = np.zeros((self._spline.count, self._follows_dof, 6, 6))
+        for form in forms:
+            if form.is_diagonal:
+                weight = np.diagonal(form.weight)[:, None, None]
+                found[:, : self._dof] += weight * form.stiffness[:, None]
         return found
 
     def _stiffness(self, order: int, shares: Array | None = None) -> Array:
         """Return K of ½ Σ K_ab y_aᵀWy_b for the ends y of each interval, (N, 6, 6)."""
-        table, scale = AT_GAUSS[order], self._spline.rates(2 * order) * self._spline.steps
+        table, scale = AT_GAUSS[order], self._spline.rates[2 * order] * self._spline.steps
         scale[self._spline.gaps] = 0.0
         if shares is None:
             return np.asarray(scale[:, None, None] * (table.T @ (WEIGHTS[:, None] * table)))
         weighted = (WEIGHTS * shares)[:, :, None] * table
         return np.asarray(scale[:, None, None] * (table.T @ weighted))
 
-    def integrand(self, motion: SampledMotion) -> Array:
-        """Return Σ G at the samples, (S,)."""
-        found = np.sum([cost.value(motion.arm) for cost in self._costs], axis=0)
-        if self._springs is not None:
-            found = found + 0.5 * motion.tolerances.q**2 @ self._springs
-        return np.asarray(found)
+    @cached_property
+    def _at_origin(self) -> tuple[Array, Array]:
+        """Value (N,) and derivatives by y (N, 6, n) of the quadratic costs where y = 0."""
+        sampling, count = self._spline.sampling, self._spline.count
+        values, slopes = np.zeros(count), np.zeros((count, 6, self._follows_dof))
+        own = [cost for cost in self._costs if is_quadratic_form(cost)]
+        if own:
+            none = {name: np.zeros((len(sampling.t), self._dof)) for name in _NAMES}
+            there = PlacedLater(self._follows, sampling, **none)
+            values += self._integrals(own, there)
+            partials = _summed([cost.gradient(there) for cost in own])
+            slopes[:, :, : self._dof] = self._by_ends(partials, there)
+        return values, slopes
+
+    def quadratic(self, ends: Array) -> Quadratic:
+        """Return what is quadratic in y (N, 6, n): costs, and smoothing."""
+        values, linear = self._at_origin
+        costs, smoothing, slopes = values.copy(), np.zeros(len(ends)), linear.copy()
+        evaluate_forms(self._cost_forms, self._smoothing_forms, ends, costs, smoothing, slopes)
+        arm, pushes = ends[:, :, : self._dof], slopes[:, :, : self._dof]
+        for form in self._coupled:
+            pushed = form.stiffness @ (arm @ form.weight)
+            values = smoothing if form.is_smoothing else costs
+            values += 0.5 * np.einsum("kaj,kaj->k", arm, pushed)
+            pushes += pushed
+        return Quadratic(costs, smoothing, slopes)
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether all costs are."""
+        return not self._bent
+
+    def bent(self, motion: SampledMotion) -> Array:
+        """Return the costs of each interval that are not quadratic, (N,)."""
+        return self._integrals(self._bent, motion.arm)
+
+    def _integrals(self, costs: Sequence[Cost], samples: Samples) -> Array:
+        """Return Σ costs of each interval, (N,)."""
+        each, weights = np.sum([cost.value(samples) for cost in costs], axis=0), samples.weights
+        # In gaps, a cost may be infinite.
+        shares, counts = np.zeros_like(each), weights > 0.0
+        shares[counts] = weights[counts] * each[counts]
+        return np.asarray(shares.reshape(self._spline.count, -1).sum(axis=1))
 
     def terms(self, samples: Samples) -> dict[str, float]:
         """Return the contribution of each cost to F, for the motion of the arm."""
         return {cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs}
 
-    def roughness(self, ends: Array) -> float:
-        """Return the contribution of the smoothing, for y (N, 6, n)."""
-        if self._smoothing is None:
-            return 0.0
-        stiffness, weight = self._smoothing
-        own = ends[:, :, : self._dof]
-        return 0.5 * float(np.sum((stiffness @ own) * (own @ weight)))
+    def partials(self, motion: SampledMotion) -> Partials:
+        """Return the derivatives of their integrands."""
+        return _summed([cost.gradient(motion.arm) for cost in self._bent])
 
-    def partials(self, samples: Samples) -> tuple[Partials, ...]:
-        """Return the derivatives of the integrand of each cost, for the motion of the arm."""
-        return tuple(cost.gradient(samples) for cost in self._costs)
+    def bent_slopes(self, motion: SampledMotion, partials: Partials) -> Array:
+        """Return their derivatives by y of the arm, (N, 6, n)."""
+        return self._by_ends(partials, motion.arm)
 
-    def slopes(self, samples: Samples, ends: Array, partials: Sequence[Partials]) -> Array:
-        """Return the derivatives of each interval's cost by y, (N, 6, n)."""
-        together, spline = _summed(partials), self._spline
+    def _by_ends(self, partials: Partials, samples: Samples) -> Array:
+        """Return the derivatives of each interval's cost by y of the arm, (N, 6, n)."""
+        spline = self._spline
         weights = samples.weights.reshape(spline.count, -1, 1)
-        found = np.zeros_like(ends)
-        own = found[:, :, : self._dof]
+        found = np.zeros((spline.count, 6, self._dof))
         for order, name in enumerate(_NAMES):
-            part = getattr(together, name)
+            part = getattr(partials, name)
             if part is not None:
-                each = weights * spline.rates(order)[:, None, None]
-                own += AT_GAUSS[order].T @ (each * part.reshape(*weights.shape[:2], -1))
-        if self._smoothing is not None:
-            stiffness, weight = self._smoothing
-            own += stiffness @ (ends[:, :, : self._dof] @ weight)
-        if self._springs is not None:
-            found[:, :, self._dof :] += self._stiffness(0) @ (
-                ends[:, :, self._dof :] * self._springs
-            )
+                each = weights * spline.rates[order][:, None, None]
+                found += AT_GAUSS[order].T @ (each * part.reshape(*weights.shape[:2], -1))
         return found
 
     def add_curvature(
-        self, matrix: NodeMatrix, by: EndChanges, samples: Samples, partials: Sequence[Partials]
+        self, matrix: NodeMatrix, by: EndChanges, motion: SampledMotion, partials: Partials
     ) -> None:
-        """Add Γᵀ (∂²F) Γ, by the coordinates of all nodes."""
+        """Add Γᵀ (∂²F) Γ, by the coordinates of all nodes; `partials` are those of `partials`."""
         matrix.add_joint_forms(by, self._joint_forms)
-        for stiffness, weight in self._coupled_forms:
-            matrix.add_form(by, stiffness, weight)
+        for form in self._coupled:
+            matrix.add_form(by, form.stiffness, form.weight)
         if self._bent:
-            self._add_bending(matrix, by, samples, _of_bent(self, partials))
+            self._add_bending(matrix, by, motion.arm, partials)
 
     def _add_bending(
         self, matrix: NodeMatrix, by: EndChanges, samples: Samples, here: Partials
@@ -188,16 +266,10 @@ class NodeCost:
                     matrix.add_products(by, *pair, weights)
 
 
-def _of_bent(cost: NodeCost, partials: Sequence[Partials]) -> Partials:
-    """Return the summed derivatives of all costs that are not quadratic forms."""
-    both = zip(cost._costs, partials, strict=True)
-    return _summed([own for cost, own in both if not cost.is_quadratic])
-
-
 def _points(cost: NodeCost, order: int, forms: Array) -> Points:
     """Return linear forms (S, n, p) of a derivative at the samples."""
     table = np.ascontiguousarray(AT_GAUSS[order])
-    return Points(table, cost._spline.rates(order), np.ascontiguousarray(forms))
+    return Points(table, cost._spline.rates[order], np.ascontiguousarray(forms))
 
 
 def _directions(cost: NodeCost, by: EndChanges) -> Array:
@@ -253,10 +325,6 @@ def _changed(
     return parts
 
 
-def _is_diagonal(weight: Array) -> bool:
-    return np.array_equal(weight, np.diag(np.diagonal(weight)))
-
-
 def _summed(each: Sequence[Partials]) -> Partials:
     """Return the sum of derivatives."""
     parts = {}
@@ -265,3 +333,30 @@ def _summed(each: Sequence[Partials]) -> Partials:
         if own:
             parts[name] = own[0] if len(own) == 1 else np.sum(own, axis=0)
     return Partials(**parts)
+
+
+@kernel
+def evaluate_forms(
+    costs: Array,
+    smoothing: Array,
+    ends: Array,
+    cost_values: Array,
+    smoothing_values: Array,
+    slopes: Array,
+) -> None:
+    """Add ½ yᵀKy + gᵀy to the values (N,) of intervals with y = `ends` (N, 6, n).
+
+    K (N, n, 6, 6) of `costs` and of `smoothing`; `slopes` (N, 6, n) are g of the costs before, and
+    g + Ky of both afterwards.
+    """
+    count, _, n = ends.shape
+    for k in range(count):
+        for j in range(n):
+            for a in range(6):
+                pushed, smoothed = 0.0, 0.0
+                for b in range(6):
+                    pushed += costs[k, j, a, b] * ends[k, b, j]
+                    smoothed += smoothing[k, j, a, b] * ends[k, b, j]
+                cost_values[k] += ends[k, a, j] * (slopes[k, a, j] + 0.5 * pushed)
+                smoothing_values[k] += 0.5 * ends[k, a, j] * smoothed
+                slopes[k, a, j] += pushed + smoothed

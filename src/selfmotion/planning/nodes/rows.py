@@ -8,7 +8,7 @@ Constraints are functions of the arm's joints, or of virtual joints: their colum
 all coordinates are filled in here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -19,6 +19,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import CurveSamples, Formulation, SampledMotion, sampled
+from selfmotion.planning.nodes.limit_kernels import LimitTable
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.point_rows import CollocationRows, PointRows
@@ -53,6 +54,8 @@ class NodeRows:
     ) -> None:
         self.spline, self.dof = spline, dof
         self.limits, self.points = tuple(limits), tuple(points)
+        joints = [(rows.item, rows.joints) for rows in self.limits]
+        self._table = LimitTable.of(joints, spline.count)
 
     @classmethod
     def of(
@@ -78,15 +81,16 @@ class NodeRows:
         """The rows of each constraint, in their order."""
         return (*self.limits, *self.points)
 
-    def residuals(self, motion: SampledMotion, ends: Array) -> Array:
+    def residuals(self, motion: Callable[[], SampledMotion], ends: Array) -> Array:
         """Return h of all rows, minus the part of the tolerance that is used, (R,).
 
         Half of each tolerance is reserved for rounding and for the motion between points.
         """
-        found = [np.zeros(0)]
-        found += [rows.residuals(ends).ravel() for rows in self.limits]
-        found += [rows.residuals(motion).ravel() for rows in self.points]
-        return np.concatenate(found)
+        limits = self._table.residuals(self.spline.rates, ends)
+        if not self.points:
+            return limits
+        points = (rows.residuals(motion()).ravel() for rows in self.points)
+        return np.concatenate([limits, *points])
 
     @cached_property
     def _places(self) -> list[tuple[slice, tuple[int, ...]]]:
@@ -113,29 +117,36 @@ class NodeRows:
 
     def near(self, h: Array) -> Flags:
         """Return the mask of nearly violated rows, (R,): of limits all of a joint and side."""
-        each = zip(self.families, self.split(h), strict=True)
-        return np.concatenate(
-            [np.zeros(0, dtype=np.bool_), *(rows.near(own).ravel() for rows, own in each)]
-        )
+        limits = self._table.near(h, self.spline.count)
+        if not self.points:
+            return limits
+        each = zip(self.points, self.of_points(h), strict=True)
+        return np.concatenate([limits, *(rows.near(own).ravel() for rows, own in each)])
 
-    def linearised(self, motion: SampledMotion, active: Flags) -> "LinearRows":
+    def of_points(self, values: Any) -> list[Any]:
+        """Return values of all rows, (R,), by constraint at points, in the shape of its rows."""
+        places = self._places[len(self.limits) :] if self.points else ()
+        return [values[place].reshape(shape) for place, shape in places]
+
+    def linearised(self, motion: Callable[[], SampledMotion], active: Flags) -> "LinearRows":
         """Return the derivatives of the active rows, (R,)."""
-        pairs = zip(self.points, self.by_kind(active)[1], strict=True)
-        return LinearRows(self, active, [rows.linearised(motion, own) for rows, own in pairs])
+        pairs = zip(self.points, self.of_points(active), strict=True)
+        points = [rows.linearised(motion(), own) for rows, own in pairs]
+        return LinearRows(self, active, points)
 
     def add_bending(
         self,
         matrix: NodeMatrix,
         by: EndChanges,
-        motion: SampledMotion,
+        motion: Callable[[], SampledMotion],
         multipliers: Array,
         *,
         without_tolerances: bool = False,
     ) -> None:
         """Add Σ multipliers · ∂²h/∂w² of rows that are sums of squares: their curvature."""
-        for rows, own in zip(self.points, self.by_kind(multipliers)[1], strict=True):
+        for rows, own in zip(self.points, self.of_points(multipliers), strict=True):
             if own.any() and not (without_tolerances and is_tolerance(rows.item)):
-                rows.add_bending(matrix, by, motion, own)
+                rows.add_bending(matrix, by, motion(), own)
 
     @cached_property
     def granted(self) -> Array:
@@ -237,46 +248,42 @@ class LinearRows:
 
     def along(self, changes: Array) -> Array:
         """Return ∂h of the active rows along changes of y (N, 6, n)."""
-        found = [np.zeros(0)]
-        for limits, own in zip(self.rows.limits, self._active[0], strict=True):
-            if own.any():
-                found.append(limits.along(changes)[own])
-        found += [points.along(changes) for points in self.points]
-        return np.concatenate(found)
+        table = self.rows._table
+        limits = table.along(self.rows.spline.rates, changes)[self.active[: table.size]]
+        if not self.points:
+            return limits
+        return np.concatenate([limits, *(points.along(changes) for points in self.points)])
 
     def pulled(self, multipliers: Array) -> Array:
         """Return Σ multipliers ∂h/∂y, (N, 6, n), for multipliers of all rows.
 
         They are 0 of inactive rows.
         """
-        count = self.rows.spline.count
-        found = np.zeros((count, 6, self.rows.dof))
-        of_limits, of_points = self.rows.by_kind(multipliers)
-        for limits, own in zip(self.rows.limits, of_limits, strict=True):
-            if own.any():
-                limits.add_pulled(found, own)
-        for points, own, active in zip(self.points, of_points, self._active[1], strict=True):
+        rows = self.rows
+        found = np.zeros((rows.spline.count, 6, rows.dof))
+        rows._table.add_pulled(rows.spline.rates, multipliers, found)
+        for points, own, active in zip(
+            self.points, rows.of_points(multipliers), self._active_points, strict=True
+        ):
             points.add_pulled(found, own[active])
         return found
 
     def add_squared(self, matrix: NodeMatrix, by: EndChanges, weights: Array) -> None:
         """Add Σ weights ∂h ∂hᵀ, for weights of all rows (R,), 0 of inactive ones."""
-        of_limits, of_points = self.rows.by_kind(weights)
-        forms = None
-        for limits, own in zip(self.rows.limits, of_limits, strict=True):
-            if own.any():
-                if forms is None:
-                    forms = np.zeros((self.rows.spline.count, self.rows.dof, 6, 6))
-                limits.add_squared(forms, own)
-        if forms is not None:
+        rows = self.rows
+        if rows.limits:
+            forms = np.zeros((rows.spline.count, rows.dof, 6, 6))
+            rows._table.add_squared(rows.spline.rates, weights, forms)
             matrix.add_joint_forms(by, forms)
-        for points, own, active in zip(self.points, of_points, self._active[1], strict=True):
+        for points, own, active in zip(
+            self.points, rows.of_points(weights), self._active_points, strict=True
+        ):
             points.add_squared(matrix, by, own[active])
 
     @cached_property
-    def _active(self) -> tuple[list[Flags], list[Flags]]:
-        """Mask of the active rows of each constraint: of limits, and of points."""
-        return self.rows.by_kind(self.active)
+    def _active_points(self) -> list[Flags]:
+        """Mask of the active rows of each constraint at points."""
+        return self.rows.of_points(self.active)
 
 
 def is_tolerance(item: BoundConstraint) -> bool:

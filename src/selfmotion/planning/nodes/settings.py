@@ -43,6 +43,9 @@ class NewtonSettings:
     quadratic_share: float = 1e-5
     # Iterations; about 15 are usual, 40 where limits bind everywhere.
     max_iterations: int = 80
+    # This number of steps in a row that are shorter than this share of Newton's lead nowhere.
+    short_steps: int = 4
+    short_length: float = 1e-3
     # Iterations in which the largest violation has to fall below `stall_factor` times what it was.
     stall_iterations: int = 12
     stall_factor: float = 0.97
@@ -55,7 +58,8 @@ class NewtonSettings:
     mu_again: float = 1.0
     # Last μ, in the same unit.
     mu_last: float = 1e-6
-    # First μ of a warm start, and last μ where a rough optimum is enough, in the same unit.
+    # First μ of a warm start, and last μ of others where a rough optimum is enough, in the same
+    # unit.
     mu_warm: float = 1e-5
     # The barrier problem counts as solved at residuals of κ_ε μ [WB eq. 7].
     kappa_epsilon: float = 10.0
@@ -71,8 +75,11 @@ class NewtonSettings:
     tau: float = 0.995
     # Share of the predicted decrease that the merit function has to fall by [NW 3.4: c₁].
     armijo: float = 1e-4
-    # Factor by which a rejected step is cut.
+    # Factor by which a rejected step is cut …
     backtracking: float = 0.5
+    # … this often; after that by what a parabola says, between these factors [NW 3.5].
+    halvings: int = 2
+    backtracking_least: float = 0.1
     # Shortest step that is tried, as a share of Newton's.
     min_length: float = 1e-7
     # Largest change of a node's coordinate in one step [rad or m].
@@ -80,6 +87,9 @@ class NewtonSettings:
     # Where no step is accepted and the predicted decrease is below this share of F, rounding is the
     # reason; above it the gradient is wrong, or rows contradict each other.
     rounding: float = 1e-5
+    # A change of the merit function above this share of it is none of rounding: where the shortest
+    # step with one raises it by half of the predicted decrease or more, the gradient is wrong.
+    visible: float = 1e-10
 
     # --- rows: slacks and elastic variables
     # Smallest first slack [units of h]: of a row that becomes active, and in a warm start.

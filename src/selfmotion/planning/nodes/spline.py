@@ -9,7 +9,7 @@ with the same tables U_o for all intervals. Its control points (of the Bernstein
 convex hull: bounds on all control points of a derivative are bounds on the whole curve.
 """
 
-from functools import cached_property
+from functools import cache, cached_property
 from math import comb, perm
 
 import numpy as np
@@ -54,6 +54,11 @@ def unit_bases(s: Array) -> tuple[Array, ...]:
     return tuple(_powers(s, order) @ _ENDS for order in range(ORDERS))
 
 
+@cache
+def _bases_at(shares: tuple[float, ...]) -> tuple[Array, ...]:
+    return unit_bases(np.array(shares))
+
+
 def _controls() -> tuple[Array, ...]:
     """Return the matrices of the control points of q, q̇, q̈ and jerk by y, (6 - o, 6) each."""
     found = []
@@ -96,6 +101,8 @@ class Quintic:
         Which intervals are gaps.
     sampling : Sampling
         Samples of costs: the Gauss points of each interval.
+    rates : (7, N)
+        h^-o by order o.
     """
 
     def __init__(self, t: Array, copies: int = 1, shares: Array = POINTS) -> None:
@@ -111,7 +118,7 @@ class Quintic:
         self.sampling = Sampling(times, each, np.arange(len(times)))
         self._powers = self.steps[:, None] ** _SCALED
         # Quadratic forms take them of twice an order.
-        self._rates = [self.steps ** float(-order) for order in range(2 * ORDERS - 1)]
+        self.rates = self.steps ** -np.arange(2.0 * ORDERS - 1.0)[:, None]
 
     @property
     def count(self) -> int:
@@ -157,22 +164,18 @@ class Quintic:
         found[self.gaps] = 0.0
         return found
 
-    def rates(self, order: int) -> Array:
-        """Return h^-o, (N,)."""
-        return self._rates[order]
-
     def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
         """Return a derivative at shares of all intervals, (N, S, n), for their U_o and y."""
-        return np.asarray((tables[order] @ ends) * self.rates(order)[:, None, None])
+        return np.asarray((tables[order] @ ends) * self.rates[order][:, None, None])
 
     @cached_property
     def _at_points(self) -> tuple[Array, ...]:
-        return unit_bases(self._shares)
+        return _bases_at(tuple(self._shares.tolist()))
 
     def at_points(self, order: int, ends: Array) -> Array:
         """Return a derivative at the `points`, (P N + 1, n)."""
         inner = self.at(self._at_points, order, ends).reshape(-1, ends.shape[2])
-        last = AT_END[order] @ ends[-1] * self.rates(order)[-1]
+        last = AT_END[order] @ ends[-1] * self.rates[order][-1]
         return np.concatenate([inner, last])
 
 

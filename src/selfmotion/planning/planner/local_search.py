@@ -153,7 +153,7 @@ class LocalSearch:
         if not is_kept(best.motion) and self.recorder.latest is not None:
             # What keeps them on the way is never given up for what is cheaper and does not.
             last, ends = self.recorder.latest.motion, np.zeros(motion.grid.ends.count)
-            best = Optimum(last, np.zeros(len(last.h)), Status.PRECISION, np.inf, ends)
+            best = Optimum(last, np.zeros(len(last.h)), Status.PRECISION, np.inf, ends, True)
         return self.outcome(best)
 
     def with_more(self, known: NodeOutcome) -> NodeOutcome | None:
@@ -173,7 +173,7 @@ class LocalSearch:
         """Return the best of the optima from other beginnings, the first, and the free one."""
         open_one = begun.grid.at(centred((free or self._freely(begun)).motion))
         ends, none = begun.grid.ends.count, np.zeros(len(open_one.h))
-        unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
+        unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends), True)
         rank = partial(_rank, begun=begun)
         best = min(first, unbound, key=rank)
         # Where that breaks little it is nearest; else the calmest motion is.

@@ -24,9 +24,9 @@ from selfmotion.planning.planner.outcomes import NodeOutcome, is_kept
 # Largest path error between nodes [m, rad] …
 _NEAR_PATH = 2e-7
 # … intervals above which are divided for this one …
-_WANTED_NEAR_PATH = 1e-7
-# … by this power of the ratio, since the error falls with the third power or more …
-_FINER_POWER = 0.3
+_WANTED_NEAR_PATH = 3e-8
+# … by this power of the ratio, since the error falls with the fourth power or more …
+_FINER_POWER = 0.25
 # … into this number of parts at most.
 _MAX_PARTS = 8.0
 # Refinement rounds.
@@ -72,7 +72,7 @@ class DividesAtNodes:
 
     def __init__(self, search: LocalSearch) -> None:
         self._search, self._most = search, most_nodes(search.formulation)
-        self._cost, self._is_rough, self._rounds = np.inf, True, _NODE_ROUNDS
+        self._cost, self._rounds = np.inf, _NODE_ROUNDS
 
     def __call__(self, known: NodeOutcome) -> NodeOutcome | None:
         """Return the optimum on more nodes, or the last one; None where it may not, or need not."""
@@ -83,7 +83,7 @@ class DividesAtNodes:
         t = self._wanted(known)
         finer = None if t is None or len(t) > self._most else known.on(t)
         polishes = finer is None
-        if polishes and not self._is_rough:
+        if polishes and known.optimum is not None and not known.optimum.is_rough:
             return None
         found = search.again(finer or known, roughly=not polishes)
         if found is None:
@@ -93,7 +93,6 @@ class DividesAtNodes:
             self._rounds = 0
             return self._without_more(known, found, polishes)
         gained = max(known.cost - found.cost, 0.0)
-        self._is_rough = not polishes
         return replace(found, remaining=(found.remaining or 0.0) + gained)
 
     def _wanted(self, known: NodeOutcome) -> Array | None:

@@ -190,8 +190,9 @@ def _stack_rows(planner: Planner) -> bool:
     """Optimise from motions that keep limits and quantities as rows of their task."""
     wanted = planner.is_sought and planner.is_unmet
     begins = planner.setup.takes_starts or not planner.setup.is_free
-    can = is_on_nodes(planner.formulation, planner.effort) and may_stack(planner)
-    if not (wanted and begins and can) or planner.is_out_of_reach():
+    if not (wanted and begins and is_on_nodes(planner.formulation, planner.effort)):
+        return False
+    if not may_stack(planner) or planner.is_out_of_reach():
         return False
     return optimise_stacked(planner, planner.setup.search.finalists)
 

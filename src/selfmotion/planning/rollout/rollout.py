@@ -4,10 +4,11 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model import kernels
-from selfmotion.model.follow import Follows, joint_columns, kinematics_of
+from selfmotion.model.follow import Follows, chain_tables, joint_columns, kinematics_of
 from selfmotion.model.motion import Grid
 from selfmotion.model.path import PathSamples
 from selfmotion.model.task import DampingLaw, feedback_rate
+from selfmotion.planning.rollout.polishing import polish
 from selfmotion.problem.costs import Samples, TipSamples
 
 # Distance of a tool on the path [m, rad].
@@ -44,8 +45,6 @@ class Rollout:
         self._space = np.zeros(kernels.space_size(*_sizes(self)[:2]))
         # Cached values of the last run.
         self._samples: Samples | None = None
-        # Work space of `polished`: one stage, at a node.
-        self._node_table, self._node, self._node_tips = _new_table(self, 1)
         for f, item in enumerate(follows.items):
             self.aim(item.target(grid.stage_times), f)
         self._at.step[:, 0] = grid.stage_steps
@@ -97,22 +96,22 @@ class Rollout:
         -------
         t, q, qd : (N + 1,), (N + 1, n), (N + 1, n)
         """
-        here, run, node = self.grid.node_stages, self._at, self._node
+        here, run = self.grid.node_stages, self._at
         q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
-        nearer = q + _correction(run.task_jacobian[here], _wrong(self, self._tips, here))
-        for i, stage in enumerate(here):
-            self._node_table[0] = self._table[stage]
-            node.q[0] = nearer[i]
-            for _ in range(_POLISHING_STEPS):
-                if self._advance(self._node_table, node.q, 0.0) is not None:
-                    break
-                left = _wrong(self, self._node_tips, np.zeros(1, dtype=np.intp))
-                q[i], qd[i] = node.q[0], node.qd[0]
-                if np.abs(left).max() < _POLISHED:
-                    break
-                node.q[0] += _correction(node.task_jacobian, left)[0]
+        parts = [(tip.target_translation[here], tip.target_rotation[here]) for tip in self._tips]
+        flat = [part.reshape(len(here), -1) for own in parts for part in own]
+        polish(
+            self._table[here],
+            np.hstack(flat),
+            chain_tables(self.follows),
+            self.follows.layout,
+            _POLISHING_STEPS,
+            _POLISHED,
+            q,
+            qd,
+        )
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
 
@@ -231,15 +230,6 @@ def _new_table(rollout: Rollout, stages: int) -> tuple[Array, kernels.Stage, lis
     return table, kernels.stage_of(table, n, m), tips
 
 
-def _wrong(rollout: Rollout, tips: list[kernels.Tip], stages: Ints) -> Array:
-    """Return the pose errors in the prescribed rows at some stages (K,), (K, m, 1)."""
-    parts = [
-        item.task.select_along(tip.error[stages, :, None], tip.rotation[stages])
-        for item, tip in zip(rollout.follows.items, tips, strict=True)
-    ]
-    return np.concatenate(parts, axis=1)
-
-
 def _last_run(
     rollout: Rollout,
 ) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
@@ -260,14 +250,3 @@ def _by_tip(rollout: Rollout, table: Array) -> Array:
     count, columns = len(rollout._tips), table.shape[1]
     shape = (len(table), count, columns // count, *table.shape[2:])
     return np.ascontiguousarray(table).reshape(shape)
-
-
-def _correction(jacobians: Array, errors: Array) -> Array:
-    """Return J⁺e for Jacobians (…, m, n) and errors (…, m, 1), (…, n); 0 where one is singular."""
-    transposed = np.swapaxes(jacobians, -1, -2)
-    try:
-        solved = np.linalg.solve(jacobians @ transposed, errors)
-    except np.linalg.LinAlgError:
-        # A motion that broke down has no Jacobians beyond that.
-        return np.zeros(transposed.shape[:-1])
-    return np.asarray((transposed @ solved)[..., 0])

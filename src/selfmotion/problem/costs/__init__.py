@@ -5,6 +5,7 @@ from selfmotion.problem.costs.base import (
     Cost as Cost,
     Partials as Partials,
     Scaled as Scaled,
+    is_quadratic_form as is_quadratic_form,
     weight_matrix as weight_matrix,
 )
 from selfmotion.problem.costs.dynamics import (

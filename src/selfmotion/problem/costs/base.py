@@ -78,6 +78,22 @@ class Cost(Saved, ABC, family="cost"):
         """Raise ProblemError where the cost does not fit an arm and a task; nothing by default."""
 
 
+def is_quadratic_form(cost: Cost) -> bool:
+    """Whether a cost is given by its `curvature`, and by its value and gradient at the origin.
+
+    Where it says so (`Cost.is_quadratic`), but not where a class that derives from one that does is
+    evaluated otherwise.
+    """
+    if not cost.is_quadratic:
+        return False
+    for kind in type(cost).__mro__:
+        if "is_quadratic" in vars(kind):
+            return True
+        if not vars(kind).keys().isdisjoint(("value", "gradient", "curvature")):
+            return False
+    return True
+
+
 def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:
     """Return a weight read-only; ProblemError unless it is positive semidefinite."""
     check_name(name)

@@ -41,7 +41,6 @@ class _Quadratic(Cost):
     """Base of the quadratic costs: the weight W."""
 
     is_pointwise: ClassVar[bool] = True
-    is_quadratic: ClassVar[bool] = True
 
     weight: float | npt.ArrayLike = 1.0
     name: str = ""
@@ -62,6 +61,7 @@ class _Quadratic(Cost):
 class _Derivative(_Quadratic):
     """½ xᵀWx for a derivative x of q."""
 
+    is_quadratic: ClassVar[bool] = True
     _order: ClassVar[int]
 
     @override
@@ -182,6 +182,8 @@ class Posture(_Quadratic):
     posture : (n,)
         q* [rad or m].
     """
+
+    is_quadratic: ClassVar[bool] = True
 
     name: str = "posture"
     posture: npt.ArrayLike = ()
