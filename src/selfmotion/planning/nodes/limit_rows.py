@@ -20,6 +20,9 @@ _BINDS = 1e-3
 # Shares of an interval at which the curve is compared with the control points.
 _FINE = unit_bases(np.linspace(0.0, 1.0, 17))
 
+# The curve itself at the shares of the control points of each derivative.
+_AT_CONTROL_SHARES = [unit_bases(np.linspace(0.0, 1.0, count)) for count in CONTROLS]
+
 
 class ControlPointRows:
     """Rows of one constraint's limits, (N, 6 - o, 2, j): by interval, control point, side, joint.
@@ -56,8 +59,7 @@ class ControlPointRows:
             once[:-1, -1] = False
         times = control_times(self._spline, item.order)[once]
         # The control polygon is outside of the curve.
-        at = unit_bases(np.linspace(0.0, 1.0, CONTROLS[item.order]))
-        used = self._at(at, ends) > item.granted - _USED
+        used = self._at(_AT_CONTROL_SHARES[item.order], ends) > item.granted - _USED
         shape = len(times), -1
         return Multipliers(item, multipliers[once].reshape(shape), times, used[once].reshape(shape))
 

@@ -93,8 +93,10 @@ def free_by_meshes(planner: Planner, *, just: bool = False) -> Iterator[Solution
     The best first; apart by the required distance, or `just` apart. Without any motion that
     satisfies all, one whose hulls overlap slightly may be the only one whose meshes do not.
     """
+    if not planner.is_unmet:
+        return
     bodies = planner.formulation.envelope.bodies
-    if not planner.is_unmet or all(model.is_all_convex for model, _ in bodies):
+    if all(model.is_all_convex for model, _ in bodies):
         return
     for solution in sorted(planner.broken, key=Solution.score):
         q = solution.evaluation.trajectory.q[:, : planner.formulation.robot.dof]

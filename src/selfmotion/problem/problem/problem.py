@@ -366,7 +366,9 @@ Problem.__init__.__annotations__["task"] = "Task | str"
 
 def check_feeds_of(problem: Problem) -> None:
     """Refuse feeds that no motion has; see `check_feeds`."""
-    paths = [item.path for item in problem.follows.items]
+    paths = [item.path for item in problem.follows.items if item.path.feeds]
+    if not paths:
+        return
     limits = envelope_without_arm(problem.robot, problem.all_constraints)
     check_feeds(problem.robot.name, paths, limits.tool_speed)
 
