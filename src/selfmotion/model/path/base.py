@@ -120,6 +120,11 @@ class Path(Saved, ABC, family="path"):
         """Feeds of the path with their own errors; a certificate judges them."""
         return ()
 
+    @property
+    def original(self) -> Path | None:
+        """The path that it is made of: at another pace, in another frame; None for others."""
+        return None
+
     @abstractmethod
     def evaluate(self, t: Array) -> PathSamples:
         """Return the motion at times (K,) known to lie in [0, duration].
@@ -214,8 +219,8 @@ class _Derived(Path):
     _path: Path
 
     @property
+    @override
     def original(self) -> Path:
-        """The original path."""
         return self._path
 
     @abstractmethod

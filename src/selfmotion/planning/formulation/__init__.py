@@ -12,7 +12,7 @@ from selfmotion.planning.formulation.formulation import (
     bound_conditions as bound_conditions,
     certified as certified,
     cost_of_motion as cost_of_motion,
-    has_no_overlap as has_no_overlap,
+    deferred_clearance as deferred_clearance,
     keeps_off_itself as keeps_off_itself,
     motion_of_all as motion_of_all,
     on_path as on_path,

@@ -29,6 +29,7 @@ from selfmotion.problem.constraints import (
     BoundConstraint,
     BoundEnd,
     BoundLimits,
+    Clearance,
     Conditions,
     Constraint,
     DependsOn,
@@ -137,7 +138,7 @@ class Formulation:
     ) -> BoundConditions:
         """Return the conditions on motions, given first and last configuration, (n,) each.
 
-        Those of the initial motion. Without that of `has_no_overlap` unless `apart`; with links
+        Those of the initial motion. Without the `deferred_clearance` unless `apart`; with links
         `decomposed` where their hulls are too large. With the arm's own limits where constraints
         have none: no motion beyond these is verified. With the bands of tolerances, and that pinned
         ends are on the path.
@@ -197,13 +198,14 @@ class Formulation:
         return path_length(self.path) / self.robot.reach
 
 
-def has_no_overlap(problem: Problem) -> bool:
-    """Whether the last clearance requires no more than that links do not overlap.
+def deferred_clearance(problem: Problem) -> Clearance | None:
+    """Return the clearance that motions are optimised without at first; None where there is none.
 
-    Motions are optimised without it at first: few break it, and distances take long.
+    The last one, where it requires no more than that links do not overlap: few motions break it,
+    and distances take long.
     """
     last = problem.clearances[-1:]
-    return any(item.is_no_overlap and item.applies(problem.robot) for item in last)
+    return next((x for x in last if x.is_no_overlap and x.applies(problem.robot)), None)
 
 
 def on_path(problem: Problem) -> Formulation:
@@ -282,9 +284,9 @@ def cost_of_motion(formulation: Formulation, motion: SampledMotion) -> float:
 def keeps_off_itself(formulation: Formulation, q: Array) -> bool:
     """Whether the arm's meshes in configurations (K, n) are free of self-collision.
 
-    Only for that of `has_no_overlap`: other clearances are the optimisation's.
+    Only for a `deferred_clearance`: other clearances are the optimisation's.
     """
-    if not has_no_overlap(formulation.problem):
+    if deferred_clearance(formulation.problem) is None:
         return True
     own = q[:, : formulation.robot.dof]
     return all(model.worst(own).value >= far for model, far in formulation.envelope.bodies)
@@ -294,9 +296,9 @@ def _conditions(formulation: Formulation, *, apart: bool, decomposed: bool) -> C
     """Return the conditions on the arm's motion, of all constraints in their order."""
     known, problem = formulation._known_conditions, formulation.problem
     if (apart, decomposed) not in known:
-        given = [*_own_limits(formulation), *problem.all_constraints]
-        if has_no_overlap(formulation.problem) and not apart:
-            given.pop()
+        deferred = None if apart else deferred_clearance(problem)
+        every = (*_own_limits(formulation), *problem.all_constraints)
+        given = [item for item in every if item is not deferred]
         if all(formulation.problem.rest_orders):
             given = [item.at_rest() for item in given]
         known[apart, decomposed] = Conditions.joined(

@@ -7,7 +7,12 @@ import numpy as np
 from selfmotion.basics import Progress
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.model.motion import Evaluation, Trajectory
-from selfmotion.planning.formulation import Formulation, certified, has_no_overlap, path_errors
+from selfmotion.planning.formulation import (
+    Formulation,
+    certified,
+    deferred_clearance,
+    path_errors,
+)
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.largest_part import Part
 from selfmotion.planning.planner.refinement import refined
@@ -172,21 +177,27 @@ class _ByPath:
 
 def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
     """Whether self-collision, which was not looked at before, is the only violation."""
-    if not has_no_overlap(formulation.problem) or len(certificate.failures) != 1:
+    problem = formulation.problem
+    deferred = deferred_clearance(problem)
+    if deferred is None or len(certificate.failures) != 1:
         return False
-    # The finding of the last requirement; those of feeds come after it.
-    feeds = sum(len(item.path.feeds) for item in formulation.problem.follows.items)
-    return not certificate.findings[-1 - feeds].satisfied
+    # Findings of feeds come after those of constraints.
+    feeds = sum(len(item.path.feeds) for item in problem.follows.items)
+    findings = certificate.findings[: len(certificate.findings) - feeds]
+    own = zip(reversed(problem.all_constraints), reversed(findings), strict=False)
+    return any(item is deferred and not finding.satisfied for item, finding in own)
 
 
 def _rough(formulation: Formulation, judged: Judged) -> bool:
     """Whether a required condition holds at the nodes, but not between them."""
     if judged.part.solution.violations or not judged.certificate.on_path:
         return False
-    requirements = formulation.problem.requirements
-    if has_no_overlap(formulation.problem):
-        # It comes last, and need not have been a constraint of the nodes.
-        requirements = requirements[:-1]
+    problem = formulation.problem
+    deferred, requirements = deferred_clearance(problem), problem.requirements
+    if deferred is not None:
+        # It need not have been a constraint of the nodes.
+        own = problem.requirement_of(deferred)
+        requirements = tuple(item for item in requirements if item is not own)
     # The arm's own limits always apply.
     required = {item.name for item in requirements} | set(LIMIT_NAMES[:2])
     nodes = judged.motion.trajectory.t

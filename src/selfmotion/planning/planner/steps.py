@@ -20,7 +20,7 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import arm_limits
 from selfmotion.model.task import SE3
-from selfmotion.planning.formulation import Formulation, has_no_overlap
+from selfmotion.planning.formulation import Formulation, deferred_clearance
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import is_on_nodes
 from selfmotion.planning.planner.guess import on_start
@@ -425,7 +425,7 @@ def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
     blocked = obstruction(formulation, np.random.default_rng(search.rng))
     if blocked is None:
         return None
-    if blocked.is_met and has_no_overlap(formulation.problem):
+    if blocked.is_met and deferred_clearance(formulation.problem) is not None:
         return blocked
     if blocked.is_met or blocked.time == 0.0:
         raise _obstruction_error(formulation, blocked)

@@ -279,6 +279,11 @@ class Problem:
     def _judging(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
+    def requirement_of(self, constraint: Constraint) -> Requirement:
+        """Return the requirement of one of its constraints, or clearances, that apply."""
+        own = zip(self.all_constraints, self._judging, strict=True)
+        return next(requirement for item, requirement in own if item is constraint)
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes before planning: overlapping links, suspicious limits or placements."""

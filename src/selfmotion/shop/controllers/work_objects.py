@@ -133,8 +133,7 @@ def _frame_of(path: Path) -> SE3:
         return path.frame * _frame_of(path.original)
     if isinstance(path, Joined):
         return frame_of_paths(path.pieces)
-    original = getattr(path, "original", None)
-    return SE3.Identity() if original is None else _frame_of(original)
+    return SE3.Identity() if path.original is None else _frame_of(path.original)
 
 
 def _check_near(robot: RobotModel, work: SE3) -> None:
