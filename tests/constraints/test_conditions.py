@@ -22,6 +22,7 @@ from selfmotion.problem.constraints import (
     NodeTangents,
     active_of,
     linearised,
+    penalised,
     penalty,
     violated,
     worst_time,
@@ -242,6 +243,37 @@ def test_half_the_margin_of_a_quantity_is_left_at_its_tolerance(
     value = float(q[row, 0]) if components == 1 else float(size[row])
     time = float(samples.sampling.node_times[row])
     assert bound.describe(samples, row, 0) == bound.quantity.said(0, value, time)
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_more_room_of_a_quantity_eases_its_rows_by_as_much_as_is_said(
+    samples: Samples, components: int
+) -> None:
+    """Rows of vectors are squares: two percent more of the limit are four of these."""
+    q = samples.q[samples.nodes]
+    size = np.abs(q[:, 0]) if components == 1 else np.linalg.norm(q[:, :components], axis=1)
+    limit = float(size.max())
+    tight, eased = (
+        BoundQuantity(quantity_of(share * limit, components), 0.0).residual(samples).max()
+        for share in (1.0, 1.02)
+    )
+    share, words = BoundQuantity(quantity_of(limit, components), 0.0).easing(0)
+    assert share == pytest.approx(tight - eased, rel=0.05)
+    assert "2 % more" in words
+
+
+@pytest.mark.parametrize("cost", [-3.0, 0.0, 5.0])
+def test_what_violates_something_costs_more_in_rankings(
+    grid: Grid, samples: Samples, cost: float
+) -> None:
+    """By its own size, or by a thousandth; also where the cost is negative."""
+    beyond = table(grid)
+    beyond[2, 0] = 0.3
+    broken = [(Given("one", beyond), samples)]
+    assert penalised(cost, []) == cost
+    added = penalised(cost, broken) - cost
+    assert added == pytest.approx(max(abs(cost), 1e-3) * penalty(broken))
+    assert added > 0.0
 
 
 def test_the_worst_time_is_that_of_the_largest_violation(grid: Grid, samples: Samples) -> None:

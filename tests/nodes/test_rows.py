@@ -140,6 +140,17 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)
 
 
+@pytest.mark.parametrize("name", ["rates", "positions", "tool"])
+def test_prices_carried_to_the_same_nodes_are_the_same(panda: sm.RobotModel, name: str) -> None:
+    motion = motion_with(panda, name)
+    prices = np.random.default_rng(0).uniform(size=len(motion.h))
+    # Control points that two intervals share are asked for once.
+    once = motion.h > -500.0
+    prices[~once] = 0.0
+    known = carried(motion.grid.rows, motion.grid.rows, prices)
+    np.testing.assert_allclose(known[once], prices[once], rtol=1e-12)
+
+
 def test_intervals_are_divided_where_something_is_beyond_between_points(
     panda: sm.RobotModel,
 ) -> None:
