@@ -32,6 +32,7 @@ from selfmotion.planning.formulation import (
 )
 from selfmotion.planning.formulation.tolerances import RowWithinBand, WithinBand
 from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.nodes.motion import slopes_of
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import AT_GAUSS
 from selfmotion.problem.constraints import DependsOn, NodeTangents
@@ -365,7 +366,7 @@ def test_gradients_along_nodes_equal_central_differences(
     size = 1e-5
     here = centred(here)
     aims = [moved(here, side * direction).objective for side in (size, -size)]
-    force = here.grid.spline.scattered(here.slopes)
+    force = here.grid.spline.scattered(slopes_of(here))
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()
@@ -391,7 +392,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
             soft.follows, spline.sampling, lambda o: spline.at(AT_GAUSS, o, ends).reshape(-1, 8)
         )
         hard = np.sum([item.value(sampled(soft, every).arm) for item in soft.costs], axis=0)
-        return float(cost.quadratic(ends).costs.sum() - spline.sampling.weights @ hard)
+        return float(cost.quadratic.at(ends).costs.sum() - spline.sampling.weights @ hard)
 
     # Being at a band all the time doubles a cost of 3.
     edge = np.zeros((6, 6, 8))
@@ -400,7 +401,7 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     samples = sampled(
         soft, CurveSamples(soft.follows, spline.sampling, lambda o: np.zeros((30, 8)))
     )
-    slopes = cost.quadratic(ends).slopes[:, :, 7:]
+    slopes = cost.quadratic.at(ends).slopes[:, :, 7:]
     direction = np.zeros_like(ends)
     direction[:, :, 7] = rng.normal(size=(6, 6))
     exact = (value(ends + 1e-4 * direction) - value(ends - 1e-4 * direction)) / 2e-4

@@ -8,6 +8,7 @@ from selfmotion.basics import Array, Counts
 from selfmotion.model.robot import has_masses
 from selfmotion.planning.formulation import with_springs
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective, on_grid
+from selfmotion.planning.nodes.motion import slopes_of, terms_of
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
 from selfmotion.problem.costs import Partials, Samples
@@ -31,7 +32,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
 
 def force_of(motion):
     """Return λ = ∂F/∂(q, q̇, q̈) of the nodes."""
-    return motion.grid.spline.scattered(motion.slopes)
+    return motion.grid.spline.scattered(slopes_of(motion))
 
 
 def gradient(motion):
@@ -202,8 +203,8 @@ def test_what_derives_from_a_quadratic_cost_is_evaluated_as_it_says(case: Case) 
     assert once.grid.cost.is_quadratic
     assert not twice.grid.cost.is_quadratic
     assert twice.cost == pytest.approx(2.0 * once.cost, rel=1e-12)
-    largest = np.abs(once.slopes).max()
-    np.testing.assert_allclose(twice.slopes, 2.0 * once.slopes, atol=1e-12 * largest)
+    largest = np.abs(slopes_of(once)).max()
+    np.testing.assert_allclose(slopes_of(twice), 2.0 * slopes_of(once), atol=1e-12 * largest)
 
 
 def test_costs_by_their_forms_are_those_by_their_samples(case: Case) -> None:
@@ -213,4 +214,4 @@ def test_costs_by_their_forms_are_those_by_their_samples(case: Case) -> None:
     motion = nodes_of(problem_of(case, costs=costs, rest=True))
     motion = centred(moved(motion, random_step(motion, 1, 0.02)))
     assert motion.grid.cost.is_quadratic
-    assert motion.cost == pytest.approx(sum(motion.terms.values()), rel=1e-12)
+    assert motion.cost == pytest.approx(sum(terms_of(motion).values()), rel=1e-12)

@@ -13,9 +13,11 @@ from selfmotion.planning.nodes.motion import (
     on_grid as on_grid,
     quickness_of as quickness_of,
     subdivisions as subdivisions,
+    terms_of as terms_of,
 )
 from selfmotion.planning.nodes.newton import Optimum as Optimum, Step as Step, minimise as minimise
 from selfmotion.planning.nodes.rows import (
+    by_kind as by_kind,
     carried as carried,
     conservatism as conservatism,
     kinks as kinks,

@@ -14,7 +14,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.planning.nodes.charts import Centred, Charts, Place
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion, stepped
+from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion, slopes_of, stepped
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 
 # A motion is finished when a step predicts less than this share of its cost.
@@ -154,7 +154,7 @@ class Batch:
         grid.counts.gradients += self.count
         # A gap's slopes may be NaN.
         spline = grid.spline
-        slopes = motion.slopes.copy()
+        slopes = slopes_of(motion).copy()
         slopes[spline.gaps] = 0.0
         force = spline.scattered(slopes)
         around = LocalModel.of(

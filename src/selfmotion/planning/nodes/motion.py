@@ -17,7 +17,8 @@ from selfmotion.planning.formulation import (
 from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.nodes.kernels import follow
-from selfmotion.planning.nodes.objective import NodeCost, Quadratic
+from selfmotion.planning.nodes.objective import NodeCost
+from selfmotion.planning.nodes.quadratic import Quadratic
 from selfmotion.planning.nodes.rows import NodeRows, is_tolerance, parts_wanted, sampled_curve
 from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
@@ -250,12 +251,7 @@ class NodeMotion:
     @cached_property
     def quadratic(self) -> Quadratic:
         """What is quadratic in the ends of the intervals."""
-        return self.grid.cost.quadratic(self.curve_ends)
-
-    @cached_property
-    def terms(self) -> dict[str, float]:
-        """Contribution of each cost."""
-        return self.grid.cost.terms(self.sampled.arm)
+        return self.grid.cost.quadratic.at(self.curve_ends)
 
     @cached_property
     def cost(self) -> float:
@@ -276,17 +272,6 @@ class NodeMotion:
         """Derivatives of the integrands at the samples, of costs that are not quadratic."""
         cost = self.grid.cost
         return Partials() if cost.is_quadratic else cost.partials(self.sampled)
-
-    @cached_property
-    def slopes(self) -> Array:
-        """Derivatives of each interval's objective by its ends y, (N, 6, n)."""
-        cost, found = self.grid.cost, self.quadratic.slopes
-        if cost.is_quadratic:
-            return found
-        pushes = cost.bent_slopes(self.sampled, self.partials)
-        found = found.copy()
-        found[:, :, : pushes.shape[2]] += pushes
-        return found
 
     @cached_property
     def h(self) -> Array:
@@ -329,6 +314,22 @@ def hermite_accelerations(spline: Quintic, size: int, q: Array, qd: Array) -> Ar
     mean = 0.5 * (before + after)
     mean[::size], mean[size - 1 :: size] = after[::size], before[size - 1 :: size]
     return np.asarray(mean)
+
+
+def terms_of(motion: NodeMotion) -> dict[str, float]:
+    """Return the contribution of each cost."""
+    return motion.grid.cost.terms(motion.sampled.arm)
+
+
+def slopes_of(motion: NodeMotion) -> Array:
+    """Return the derivatives of each interval's objective by its ends y, (N, 6, n)."""
+    cost, found = motion.grid.cost, motion.quadratic.slopes
+    if cost.is_quadratic:
+        return found
+    pushes = cost.bent_slopes(motion.sampled, motion.partials)
+    found = found.copy()
+    found[:, :, : pushes.shape[2]] += pushes
+    return found
 
 
 def centred(motion: NodeMotion) -> Centred:
@@ -415,7 +416,7 @@ def broken_intervals(motion: NodeMotion) -> Flags:
 
 def forget(motion: NodeMotion) -> None:
     """Drop cached values."""
-    for name in ("sampled", "checked", "quadratic", "partials", "slopes", "h", "curve_ends"):
+    for name in ("sampled", "checked", "quadratic", "partials", "h", "curve_ends"):
         motion.__dict__.pop(name, None)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.ends import Border
 from selfmotion.planning.nodes.local_model import LocalModel
-from selfmotion.planning.nodes.motion import NodeMotion, breaks_hard
+from selfmotion.planning.nodes.motion import NodeMotion, breaks_hard, slopes_of
 from selfmotion.planning.nodes.newton_kernels import eliminate, step_rows
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.rows import LinearRows
@@ -83,7 +83,8 @@ class Model(NamedTuple):
         """
         grid, spline = motion.grid, motion.grid.spline
         grid.counts.gradients += 1
-        by_cost = spline.scattered(motion.slopes)
+        slopes = slopes_of(motion)
+        by_cost = spline.scattered(slopes)
         rows = grid.rows.linearised(lambda: motion.checked, own.active)
         force, multipliers = by_cost, own.of_all(own.multipliers)
         wild = float(np.max(own.h, initial=0.0)) > SETTINGS.gauss_newton_violation
@@ -105,7 +106,7 @@ class Model(NamedTuple):
         grid.rows.add_bending(
             curvature, by, lambda: motion.checked, multipliers, without_tolerances=without
         )
-        gradient = by.pulled(motion.slopes)
+        gradient = by.pulled(slopes)
         gradient.reshape(-1)[grid.held] = 0.0
         border = grid.ends.border(motion.c, around.changes, grid.held)
         return cls(gradient, by, around, curvature, rows, border)

@@ -110,11 +110,6 @@ class NodeRows:
         """Return values of all rows, (R,), by constraint, in the shape of its rows."""
         return [values[place].reshape(shape) for place, shape in self._places]
 
-    def by_kind(self, values: Any) -> tuple[list[Any], list[Any]]:
-        """Return the same of limits, and of points."""
-        each = self.split(values)
-        return each[: len(self.limits)], each[len(self.limits) :]
-
     def near(self, h: Array) -> Flags:
         """Return the mask of nearly violated rows, (R,): of limits all of a joint and side."""
         limits = self._table.near(h, self.spline.count)
@@ -158,9 +153,15 @@ class NodeRows:
         return np.concatenate([np.zeros(0), *each])
 
 
+def by_kind(every: NodeRows, values: Any) -> tuple[list[Any], list[Any]]:
+    """Return values of all rows, (R,), by constraint: of limits, and of points."""
+    each = every.split(values)
+    return each[: len(every.limits)], each[len(every.limits) :]
+
+
 def multipliers_of(every: NodeRows, multipliers: Array, ends: Array) -> list[Multipliers]:
     """Return the multipliers by constraint, in the order of time, for those of all (R,)."""
-    limits, points = every.by_kind(multipliers)
+    limits, points = by_kind(every, multipliers)
     return [
         *(rows.multipliers_of(own, ends) for rows, own in zip(every.limits, limits, strict=True)),
         *(rows.multipliers_of(own) for rows, own in zip(every.points, points, strict=True)),
@@ -173,7 +174,7 @@ def conservatism(every: NodeRows, multipliers: Array, ends: Array) -> Array:
     To first order: multipliers times the distance of the control points from the curve.
     """
     found = np.zeros(every.spline.count)
-    for rows, own in zip(every.limits, every.by_kind(multipliers)[0], strict=True):
+    for rows, own in zip(every.limits, by_kind(every, multipliers)[0], strict=True):
         if own.any():
             found += rows.conservatism(own, ends)
     return found
@@ -204,7 +205,7 @@ def kinks(every: NodeRows, ends: Array) -> Flags:
 
 def carried(every: NodeRows, before: "NodeRows", multipliers: Array) -> Array:
     """Return the multipliers of these rows, (R,), by those of the nearest rows before."""
-    limits, points = before.by_kind(multipliers)
+    limits, points = by_kind(before, multipliers)
     found = [
         np.zeros(0),
         *(

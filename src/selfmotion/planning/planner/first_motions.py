@@ -8,7 +8,14 @@ import numpy as np
 
 from selfmotion.model.motion import Grid
 from selfmotion.planning.formulation import BoundConditions
-from selfmotion.planning.nodes import NodeGrid, NodeMotion, centred, minimise, on_grid
+from selfmotion.planning.nodes import (
+    NodeGrid,
+    NodeMotion,
+    by_kind,
+    centred,
+    minimise,
+    on_grid,
+)
 from selfmotion.planning.planner.outcomes import is_kept, rank_of
 from selfmotion.planning.planner.recorder import Recorder
 from selfmotion.problem.costs import Cost, JointAcceleration, JointJerk
@@ -59,7 +66,7 @@ def _costs_of_limits(begun: NodeMotion) -> tuple[Cost, ...]:
     """Return what uses of the limits of q̈ and jerk that a motion violates cost; none for none."""
     grid, formulation = begun.grid, begun.grid.formulation
     found, most = list[Cost](), _SMOOTHING * abs(begun.objective) / formulation.path.duration
-    residuals = grid.rows.by_kind(begun.h)[0]
+    residuals = by_kind(grid.rows, begun.h)[0]
     for item, h in zip(grid.conditions.limits, residuals, strict=True):
         if item.order in _SMOOTHING_COSTS and (h > 0.0).any():
             weight = np.zeros(formulation.robot.dof)

@@ -26,6 +26,7 @@ from selfmotion.planning.nodes import (
     null_motion_of,
     on_grid,
     quickness_of,
+    terms_of,
 )
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import UNKEPT
@@ -323,7 +324,7 @@ class NodeOutcome:
     def evaluation(self) -> Evaluation:
         """The motion with its costs."""
         motion = self.motion
-        found = Evaluation(_coefficients(motion), motion.terms, motion.trajectory, damped=False)
+        found = Evaluation(_coefficients(motion), terms_of(motion), motion.trajectory, damped=False)
         forget(motion)
         return found
 
