@@ -14,6 +14,7 @@ import selfmotion as sm
 from selfmotion.basics import ANGLES, LENGTHS, in_si, read_document
 from selfmotion.model.robot import Coordinate
 from selfmotion.shell.documents import plan_request_of
+from selfmotion.shell.documents.constraint_tables import CONSTRAINTS
 from selfmotion.shell.documents.schema import json_schema
 from support.cells import CELL, written
 from support.shell import complaint
@@ -243,6 +244,7 @@ def test_a_margin_that_is_a_share_has_no_unit(kind: str) -> None:
         in_si({"constraints": [{"kind": kind, "margin_deg": 0.5}]})
     found = in_si({"constraints": [{"kind": "JointPositionLimits", "margin_deg": 0.5}]})
     assert found["constraints"][0]["margin"] == pytest.approx(np.radians(0.5))
-    kinds = json_schema()["$defs"]
-    assert "margin_deg" not in kinds[kind]["properties"]
-    assert "margin_deg" in kinds["JointPositionLimits"]["properties"]
+    tables = CONSTRAINTS.by_name()
+    known = json_schema()["$defs"]
+    assert "margin_deg" not in known[tables[kind].__name__]["properties"]
+    assert "margin_deg" in known[tables["JointPositionLimits"].__name__]["properties"]

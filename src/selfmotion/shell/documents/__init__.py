@@ -14,8 +14,10 @@ from selfmotion.shell.documents.joint_limits import (
 )
 from selfmotion.shell.documents.named_files import named_from as named_from
 from selfmotion.shell.documents.overrides import (
+    belonging as belonging,
     grid_documents as grid_documents,
     keys_of as keys_of,
+    moved_workpiece as moved_workpiece,
     parse_setting as parse_setting,
     set_key as set_key,
     write_combination as write_combination,
@@ -24,12 +26,6 @@ from selfmotion.shell.documents.problem_file import (
     plan_request_of as plan_request_of,
     read_job as read_job,
     read_problem as read_problem,
-)
-from selfmotion.shell.documents.problem_parts import (
-    belonging as belonging,
-    moved_workpiece as moved_workpiece,
-    obstacle as obstacle,
-    path_of as path_of,
 )
 from selfmotion.shell.documents.problem_writing import (
     problem_document as problem_document,

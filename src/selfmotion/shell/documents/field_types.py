@@ -1,21 +1,51 @@
-"""Types of the fields of problem files: what each accepts, says, and tells editors."""
+"""Types of the keys of problem files: what each accepts, says, and tells editors."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import PlainValidator, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import CoreSchema, core_schema
 
 from selfmotion.basics import PathError, is_number
 from selfmotion.model.path import ORIENTATIONS, pose_of
+from selfmotion.model.task import SE3
 
 # No angle, length, weight or time is beyond this, and its square is a number still.
 _HUGE = 1e15
 
 
-def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -> Any:
-    """Return a type that accepts values of a kind, and says what was expected otherwise."""
+def key(told: str | None = None, default: Any = None) -> Any:
+    """Return a key that may be left out, with the sentence that says what it is.
+
+    That of a table may be the table's own.
+    """
+    return Field(default, description=told)
+
+
+def needed(told: str) -> Any:
+    """Return a key that has to be given, with the sentence that says what it is."""
+    return Field(description=told)
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Makes a type of a function that returns a value or refuses it, and of its JSON Schema."""
+
+    check: Callable[[Any], Any]
+    schema: Mapping[str, Any]
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+    def __get_pydantic_json_schema__(self, _schema: Any, _handler: Any) -> dict[str, Any]:
+        return dict(self.schema)
+
+
+def _of_kind(kind: type | tuple[type, ...], what: str) -> Callable[[Any], Any]:
+    """Return a function that refuses what is not of a kind, and says what was expected."""
 
     def check(value: Any) -> Any:
         sound = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
@@ -23,7 +53,7 @@ def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -
             raise ValueError(f"is {value!r}, expected {what}")
         return value
 
-    return Annotated[Any, PlainValidator(check), WithJsonSchema(schema)]
+    return check
 
 
 def _is_sensible(value: float) -> bool:
@@ -71,15 +101,20 @@ def _names(value: Any) -> Any:
     return listed
 
 
+def _several_names(value: Any) -> Any:
+    if isinstance(value, str):
+        raise ValueError(f"is {value!r}, expected a list of names")
+    return _names(value)
+
+
 def _coordinates(value: Any) -> Any:
-    """Check a table of joint coordinates."""
-    if not isinstance(value, Mapping) or not all(map(_is_number, value.values())):
+    if not isinstance(value, Mapping) or not all(map(_is_coordinate, value.values())):
         raise ValueError(f"is {value!r}, expected a table of joints and numbers")
     return dict(value)
 
 
-def _is_number(value: Any) -> bool:
-    return _are_numbers(value) and not isinstance(value, list) and _is_sensible(value)
+def _is_coordinate(value: Any) -> bool:
+    return is_number(value) and _is_sensible(value)
 
 
 def _start(value: Any) -> Any:
@@ -88,74 +123,49 @@ def _start(value: Any) -> Any:
     return value if isinstance(value, str) else _numbers(value)
 
 
-_ANY_NUMBERS = {"anyOf": [{"type": "number"}, {"type": "array"}]}
+_NUMBER = {"type": "number"}
+_TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_STRINGS = {"type": "array", "items": {"type": "string"}}
 
-
-_TRIPLE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
-
-
-_POSE = {
-    "anyOf": [
-        {"type": "array", "minItems": 4, "maxItems": 4},
-        {
-            "title": "Pose",
-            "type": "object",
-            "properties": {"position": _TRIPLE, **{key: {"type": "array"} for key in ORIENTATIONS}},
-            "additionalProperties": False,
-        },
-    ]
-}
-
-
-Number = _checked((int, float), "a number", {"type": "number"})
-
-
-Whole = _checked(int, "a whole number", {"type": "integer"})
-
-
-Flag = _checked(bool, "true or false", {"type": "boolean"})
-
-
-Text = _checked(str, "a text", {"type": "string"})
-
-
-Table = _checked(Mapping, "a table", {"type": "object"})
-
-
-def _keys(*names: str) -> dict[str, Any]:
-    """Return the schema of a table whose own reader refuses other keys."""
-    keys: dict[str, Any] = {name: {"type": "number"} for name in names}
-    keys["axis"] = _TRIPLE
-    return {"type": "object", "properties": keys, "additionalProperties": False}
-
-
-Leads = _checked(Mapping, "a table", _keys("length", "duration"))
-
-
-Weave = _checked(Mapping, "a table", _keys("amplitude", "pitch", "dwell"))
-
-
-Numbers = Annotated[Any, PlainValidator(_numbers), WithJsonSchema(_ANY_NUMBERS)]
-
-
-Axis = Annotated[
-    Any, PlainValidator(_axis), WithJsonSchema({"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})
-]
-
-
-Pose = Annotated[Any, PlainValidator(_pose), WithJsonSchema(_POSE)]
-
-
-Coordinates = Annotated[Any, PlainValidator(_coordinates), WithJsonSchema({"type": "object"})]
-
-
-Names = Annotated[
-    Any, PlainValidator(_names), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}]})
-]
-
-
+Number = Annotated[float, Checked(_of_kind((int, float), "a number"), _NUMBER)]
+Whole = Annotated[int, Checked(_of_kind(int, "a whole number"), {"type": "integer"})]
+Flag = Annotated[bool, Checked(_of_kind(bool, "true or false"), {"type": "boolean"})]
+Text = Annotated[str, Checked(_of_kind(str, "a text"), {"type": "string"})]
+File = Annotated[str, Checked(_of_kind(str, "the name of a file"), {"type": "string"})]
+Files = Annotated[list[str], Checked(_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})]
+AnyTable = Annotated[dict[str, Any], Checked(_of_kind(Mapping, "a table"), {"type": "object"})]
+Numbers = Annotated[Any, Checked(_numbers, {"anyOf": [_NUMBER, {"type": "array"}]})]
+Axis = Annotated[Any, Checked(_axis, {"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})]
+Coordinates = Annotated[dict[str, float], Checked(_coordinates, {"type": "object"})]
+Names = Annotated[list[str], Checked(_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})]
+SeveralNames = Annotated[list[str], Checked(_several_names, _STRINGS)]
 Start = Annotated[
-    Any,
-    PlainValidator(_start),
-    WithJsonSchema({"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}),
+    Any, Checked(_start, {"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]})
 ]
+
+_OF_THE_AXES = f"of the axes; one of {', '.join([*ORIENTATIONS][:-1])} and {[*ORIENTATIONS][-1]}."
+
+
+class PoseTable(BaseModel):
+    """A pose: a position, and an orientation in one of several ways; or a 4 × 4 matrix."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    position: Numbers = key("Of the origin [m].")
+    rotation: Numbers = key(f"3 × 3 matrix {_OF_THE_AXES}")
+    quaternion: Numbers = key(f"w, x, y, z {_OF_THE_AXES}")
+    rpy: Numbers = key(f"Roll, pitch and yaw [rad] {_OF_THE_AXES}")
+    rotation_vector: Numbers = key(f"Axis times angle [rad] {_OF_THE_AXES}")
+    normal: Numbers = key("Direction of the z axis, instead of an orientation.")
+
+
+class _Posed:
+    """Makes a type of poses: a table of a position and an orientation, or a matrix."""
+
+    def __get_pydantic_core_schema__(self, _source: Any, handler: Any) -> CoreSchema:
+        matrix = Annotated[list[Any], Field(min_length=4, max_length=4)]
+        written = handler.generate_schema(matrix | PoseTable)
+        return core_schema.no_info_plain_validator_function(_pose, json_schema_input_schema=written)
+
+
+Pose = Annotated[SE3, _Posed()]

@@ -1,7 +1,6 @@
 """From a problem back to its file."""
 
 import dataclasses
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -12,23 +11,8 @@ from selfmotion.basics import (
     ProblemError,
     Saved,
     as_path,
-    is_file,
     public_name,
-    shown,
     write_document,
-)
-from selfmotion.model.robot import (
-    LIMITS,
-    NAMED_ARMS,
-    NAMED_PARTS,
-    TOOL_JOINT,
-    RobotModel,
-    UrdfPart,
-    load_robot,
-    mimic_of,
-    mounting_of,
-    moving_joints,
-    names_of,
 )
 from selfmotion.planning.optimise import QuasiNewton
 from selfmotion.planning.planner import PlanRequest
@@ -103,7 +87,9 @@ def _plain(value: Any) -> Any:
 
 def problem_table(problem: Problem) -> dict[str, Any]:
     """Return the table of a problem file; see `write_problem`."""
-    table = problem_to_dict(problem, _robot, _described)
+    from selfmotion.shell.documents.robot_tables import RobotTable
+
+    table = problem_to_dict(problem, RobotTable.of, _described)
     if "collision" in table:
         # Plans' files have the name that it had when their format was made.
         table["clearance"] = table.pop("collision")
@@ -112,148 +98,6 @@ def problem_table(problem: Problem) -> dict[str, Any]:
         if isinstance(item, dict):
             del item["kind"]
     return {key: _without_none(value) for key, value in table.items()}
-
-
-def _robot(robot: RobotModel) -> dict[str, Any]:
-    mounting, source = mounting_of(robot.urdf, robot.tool), FilePath(robot.urdf.source)
-    tools = [mounting.tool, *robot.tools[1:]]
-    table: dict[str, Any] = {"tool": tools[0] if len(tools) == 1 else tools}
-    if robot.reference is not None:
-        table["reference"] = robot.reference
-    if mounting.tool_offset is not None:
-        position, rpy = mounting.tool_offset
-        table["tool_offset"] = {"position": position, "rpy": rpy}
-    if robot.urdf.packages:
-        table["packages"] = list(robot.urdf.packages)
-    if mounting.bodies:
-        table["bodies"] = mounting.bodies
-    _check_frames(robot)
-    if robot.urdf.parts:
-        _check_unchanged(robot, tools)
-        table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
-        table["lock"] = dict(robot.locked)
-        return table
-    named = next((name for name in names_of(str(source)) if _is_named(robot, name)), None)
-    if named is not None:
-        table["name"] = named
-    elif source.suffix == ".urdf" and is_file(source) and not robot.urdf.has_changed():
-        table["file"] = str(source.resolve())
-    else:
-        raise ProblemError(
-            f"{robot.name}: its URDF is not (or no longer) in the file '{source}', which a problem "
-            f"file could name; write `robot.urdf.text` to a .urdf file and load it from there"
-        )
-    calibration = robot.urdf.calibration
-    if calibration is not None:
-        table["calibration"] = calibration
-    now = load_robot(
-        named or source,
-        tools,
-        robot.locked,
-        reference=robot.reference,
-        packages=robot.urdf.packages,
-        calibration=calibration,
-    )
-    _check_limits(robot, now)
-    _check_calibration(robot, now)
-    if mounting.base is not None:
-        table["base"] = {"position": mounting.base[0], "rpy": mounting.base[1]}
-    table["lock"] = dict(robot.locked)
-    return table
-
-
-def _check_limits(robot: RobotModel, reloaded: RobotModel) -> None:
-    """Refuse an arm that was given other limits than it is loaded with."""
-    for name in (*LIMITS, "acceleration_limit", "jerk_limit"):
-        if not np.array_equal(getattr(robot, name), getattr(reloaded, name)):
-            raise ProblemError(
-                f"{robot.name}: its {name} is another than it is loaded with, which a problem file "
-                f"cannot carry; ask for limits by constraints (JointVelocityLimits, …)"
-            )
-
-
-def _check_calibration(robot: RobotModel, reloaded: RobotModel) -> None:
-    """Refuse an arm whose joints are elsewhere than its calibration file says now."""
-    if not robot.urdf.is_calibrated:
-        return
-    placements = _placements(robot)
-    if any(placements[name] != place for name, place in _placements(reloaded).items()):
-        raise ProblemError(
-            f"{robot.name}: its joints are elsewhere than its calibration file says now, so that "
-            f"a problem file would name another arm; load it again"
-        )
-
-
-def _placements(robot: RobotModel) -> dict[str, dict[str, str]]:
-    """Return where each joint is in its parent link, as the URDF says it."""
-    joints = ElementTree.fromstring(robot.urdf.text).findall("joint")
-    origins = {joint.get("name", ""): joint.find("origin") for joint in joints}
-    return {name: {} if found is None else found.attrib for name, found in origins.items()}
-
-
-def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
-    """Refuse a cell whose parts' files are no longer those that it was made of."""
-    parts = robot.urdf.parts
-    for part in parts:
-        if part.source not in {**NAMED_ARMS, **NAMED_PARTS} and not is_file(FilePath(part.source)):
-            raise ProblemError(
-                f"{robot.name}: part '{part.name}' is of {part.source}, and in no file that a "
-                f"problem file could name; write its URDF to one and load it from there"
-            )
-    now = load_robot(
-        {part.name: part.source for part in parts},
-        tools,
-        robot.locked,
-        reference=robot.reference,
-        base={part.name: part.base for part in parts if part.base is not None},
-        on={part.name: part.on for part in parts if part.on is not None},
-        arguments={part.name: part.arguments for part in parts},
-        packages=robot.urdf.packages,
-        calibration={part.name: part.calibration for part in parts if part.calibration} or None,
-    )
-    _check_calibration(robot, now)
-    if now.urdf.bare_text() != robot.urdf.bare_text():
-        raise ProblemError(
-            f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
-            f"problem file would name another cell; load it again"
-        )
-    _check_limits(robot, now)
-
-
-def _check_frames(robot: RobotModel) -> None:
-    """Refuse an arm that was loaded for other frames than those it follows paths with."""
-    offset = robot.urdf.joints.get(TOOL_JOINT)
-    moving = moving_joints(robot.urdf, robot.tools, robot.reference)
-    free = {mimic_of(robot.urdf, joint.name).joint for joint in moving} - set(robot.locked)
-    if free != set(robot.joint_names) or (offset is not None and offset.child != robot.tool):
-        raise ProblemError(
-            f"{robot.name}: was loaded for other frames, so that its joints or its tool_offset "
-            f"would be others in a file; load it with tool={shown(list(robot.tools))}, "
-            f"reference={robot.reference!r}, as its paths are followed"
-        )
-
-
-def _part(part: UrdfPart) -> dict[str, Any]:
-    is_known_by_name = part.source in {**NAMED_ARMS, **NAMED_PARTS}
-    source = part.source if is_known_by_name else str(FilePath(part.source).resolve())
-    table: dict[str, Any] = {"name" if is_known_by_name else "file": source}
-    if part.base is not None:
-        table["base"] = {
-            "position": part.base.translation.tolist(),
-            "rotation": part.base.rotation.tolist(),
-        }
-    if part.on is not None:
-        table["on"] = part.on
-    if part.calibration is not None:
-        table["calibration"] = part.calibration
-    if part.arguments:
-        table["arguments"] = dict(part.arguments)
-    return table
-
-
-def _is_named(robot: RobotModel, name: str) -> bool:
-    reloaded = load_robot(name)
-    return reloaded.urdf.text == robot.urdf.bare_text() and reloaded.touching == robot.touching
 
 
 def _described(value: Saved) -> dict[str, Any]:
