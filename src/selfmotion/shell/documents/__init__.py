@@ -1,5 +1,6 @@
 """Problem files and job files: what they may say, read and written."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from selfmotion.shell.documents.example import (
@@ -43,3 +44,10 @@ def json_schema() -> dict[str, Any]:
     from selfmotion.shell.documents import schema
 
     return schema.json_schema()
+
+
+def flipped_normals(table: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """Return a table of a file of poses with its normals the other way, and how to say that."""
+    from selfmotion.shell.documents import path_tables
+
+    return path_tables.flipped_normals(table)

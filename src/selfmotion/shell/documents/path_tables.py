@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -422,6 +422,13 @@ class FilePoses(FrameKeys, BoundsTable):
         )
         told = f"no frame is given: places of the file are in that of {root} (else: frame, --frame)"
         return path.noted((*path.notes, told))
+
+
+def flipped_normals(table: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """Return a table of poses with its normals the other way, and how the shell says that."""
+    flips = not table.get("flip_normals", False)
+    said = "with --set path.flip_normals=true" if flips else "without path.flip_normals"
+    return {**table, "flip_normals": flips}, said
 
 
 class FilePath(PathTable, FilePoses):
