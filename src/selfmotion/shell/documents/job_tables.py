@@ -226,17 +226,17 @@ class JobFile(SharedTable):
         "Seams of a job, for `selfmotion job`: a list, or one table with a file of them."
     )
 
-    def build(self, context: Context, degrees_key: str = "") -> SeamJob:
+    def build(self, context: Context) -> SeamJob:
         """Return the job, at the highest feed where that is asked for."""
         if isinstance(self.seams, SeamsFile):
             if self.seams.feed == HIGHEST:
-                return self._at_highest(context, degrees_key, self.seams)
+                return self._at_highest(context, self.seams)
             if self.seams.most_feed is not None:
                 raise FileFormatError(
                     f"{context.file}: seams: most_feed: has no effect where feed is a number; give "
                     f"feed = '{HIGHEST}', or leave it out"
                 )
-        task = self.arm(context, degrees_key)
+        task = self.arm(context)
         kept, parts = self.kept(context), self.built(context, "costs", "relaxations")
         constraints = [*kept.get("constraints", KEPT), *self.limits(context)]
         apart = kept.get("clearance", NO_OVERLAP)
@@ -255,7 +255,7 @@ class JobFile(SharedTable):
             notes=tuple(context.notes),
         )
 
-    def _at_highest(self, context: Context, degrees_key: str, seams: SeamsFile) -> SeamJob:
+    def _at_highest(self, context: Context, seams: SeamsFile) -> SeamJob:
         """Return the job that asks for the highest feed."""
         most = FASTEST_FEED if seams.most_feed is None else seams.most_feed
         if not 0.0 < most <= FASTEST_FEED:
@@ -267,7 +267,7 @@ class JobFile(SharedTable):
         def at_feed(feed: float) -> SeamJob:
             table = seams.model_copy(update={"feed": feed, "most_feed": None})
             again = copy(context)
-            again.notes = []
-            return self.model_copy(update={"seams": table}).build(again, degrees_key)
+            again.notes = list(context.notes)
+            return self.model_copy(update={"seams": table}).build(again)
 
         return replace(at_feed(_SLOW * most), at_feed=at_feed, most_feed=float(most))

@@ -235,7 +235,7 @@ class ShapePath(FramedPath, BoundsTable):
         """Return the tool motion; in a frame it has to say where it begins."""
         if place is not None and self.start is None:
             raise ProblemError(
-                "workpiece: path.start is missing: the tool's first pose in its frame"
+                "start is missing: the tool's first pose in the frame of the workpiece"
             )
         return super().build(context, place)
 

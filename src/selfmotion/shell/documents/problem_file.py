@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from selfmotion.basics import (
     PER_JOINT,
@@ -18,9 +18,8 @@ from selfmotion.planning.planner import PlanRequest
 from selfmotion.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from selfmotion.shell.documents.tables import Context, Table
-
-_Model = TypeVar("_Model", bound="Table")
+    from selfmotion.shell.documents.job_tables import JobFile
+    from selfmotion.shell.documents.problem_table import ProblemTable
 
 
 def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
@@ -70,29 +69,31 @@ def plan_request_of(
     # The models take a tenth of a second, which commands without a file are spared.
     from selfmotion.shell.documents.problem_table import ProblemTable
 
-    table, context, degrees_key = table_of(ProblemTable, document, file, allow_code, cache)
-    return table.build(context, degrees_key)
+    found: PlanRequest = built(ProblemTable, document, file, allow_code, cache)
+    return found
 
 
-def table_of(
-    model: type[_Model],
+def built(
+    model: type[ProblemTable | JobFile],
     document: Mapping[str, Any],
     file: FilePath | None,
     allow_code: bool,
     cache: dict[str, Any] | None,
-) -> tuple[_Model, Context, str]:
-    """Return the table of a document, what it is built with, and a key of degrees joint by joint.
+    notes: Sequence[str] = (),
+) -> Any:
+    """Return what the table of a document stands for.
 
     Raises
     ------
     FileFormatError
-        The document is not what its model says.
+        The document is not what its model says, or cannot be planned.
     """
     from selfmotion.shell.documents.checking import checked
     from selfmotion.shell.documents.own_code import import_own
     from selfmotion.shell.documents.tables import Context
 
-    context = Context(file, cache={} if cache is None else cache)
+    context = Context(file, cache={} if cache is None else cache, notes=list(notes))
+    context.degrees_key = _key_of_joint_degrees(document)
     with context.naming():
         if ("seams" in document or "job" in document) and "seams" not in model.model_fields:
             raise ProblemError(
@@ -102,7 +103,8 @@ def table_of(
             )
         raw = in_si(document)
         context.functions = import_own(raw, context.beside(""), allow_code)
-        return checked(model, raw, document), context, _key_of_joint_degrees(document)
+        table = checked(model, raw, document)
+    return table.build(context)
 
 
 def _key_of_joint_degrees(document: Any, where: str = "") -> str:

@@ -227,8 +227,8 @@ class SharedTable(PartTable):
     workpiece: WorkpieceTable = key()
     joint_limits: File = key("A MoveIt file of joint limits that count besides the arm's own.")
 
-    def arm(self, context: Context, degrees_key: str) -> Task:
-        """Make the arm, and return the task; `degrees_key` gives degrees joint by joint, if any."""
+    def arm(self, context: Context) -> Task:
+        """Make the arm, and return the task."""
         on = None if self.workpiece is None else self.workpiece.on
         if on is not None and self.robot.reference != on:
             with context.naming():
@@ -239,8 +239,8 @@ class SharedTable(PartTable):
         with context.naming("robot"):
             context.robot = robot = self.robot.build(context)
         slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
-        if degrees_key and slides:
-            with context.naming(degrees_key):
+        if context.degrees_key and slides:
+            with context.naming(context.degrees_key):
                 raise ProblemError(
                     f"joint '{slides[0]}' slides, its coordinate is in metres; give rad and m "
                     f"under the key without _deg"
@@ -258,7 +258,7 @@ class SharedTable(PartTable):
             found["constraints"] = context.each(
                 "constraints",
                 self.constraints,
-                lambda x: {"bodies": bodies} if x in former[:1] else {},
+                lambda x: {"bodies": bodies} if former and x is former[0] else {},
             )
         apart = self._apart(context, () if former else bodies)
         if former:
@@ -342,9 +342,9 @@ class ProblemTable(SharedTable):
     loop: LoopTable = key()
     grid: AnyTable = key("Values to try for keys, for `selfmotion batch`: a list for each.")
 
-    def build(self, context: Context, degrees_key: str = "") -> PlanRequest:
+    def build(self, context: Context) -> PlanRequest:
         """Return the problem, and how it is planned."""
-        task = self.arm(context, degrees_key)
+        task = self.arm(context)
         with context.naming("start"):
             context.start = context.once(
                 (self.robot, self.start, task.value),

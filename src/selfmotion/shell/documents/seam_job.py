@@ -17,7 +17,7 @@ from selfmotion.basics import (
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints import NO_OVERLAP, as_clearances
 from selfmotion.problem.problem import Problem
-from selfmotion.shell.documents.problem_file import table_of
+from selfmotion.shell.documents.problem_file import built
 from selfmotion.work.job import FASTEST_FEED, Program, Seam, highest_feed, plan_job, problem_of_seam
 
 _RENAMED = (
@@ -157,7 +157,6 @@ def seam_job_of(
             "move_seconds" if key == "deadline" else key: value for key, value in settings.items()
         }
         document = {**document, "job": settings}
-    table, context, degrees_key = table_of(JobFile, document, file, allow_code, cache)
-    if is_former:
-        context.notes.append(_RENAMED)
-    return table.build(context, degrees_key)
+    notes = (_RENAMED,) if is_former else ()
+    found: SeamJob = built(JobFile, document, file, allow_code, cache, notes)
+    return found

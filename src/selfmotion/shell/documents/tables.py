@@ -59,6 +59,8 @@ class Context:
         The start configuration, likewise.
     arguments, packages
         What the arm's xacro file is given, and where its packages are.
+    degrees_key : str
+        A key of the document that gives degrees joint by joint; "" for none.
     where : str
         Of which part of the document errors are told, such as a seam; "" for none.
     """
@@ -71,6 +73,7 @@ class Context:
     start: Array | None = None
     arguments: Mapping[str, Any] | None = None
     packages: Sequence[FilePath] = ()
+    degrees_key: str = ""
     where: str = ""
 
     def beside(self, name: str) -> FilePath:
