@@ -2,12 +2,16 @@
 
 import inspect
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 import selfmotion as sm
 from selfmotion.model.collision import obstacle_shapes
+from selfmotion.model.task import SE3
 from selfmotion.shell.documents.body_tables import BODIES
 from selfmotion.shell.documents.constraint_tables import (
     CONSTRAINTS,
@@ -15,8 +19,9 @@ from selfmotion.shell.documents.constraint_tables import (
     DampingTable,
     RelaxationTable,
 )
-from selfmotion.shell.documents.cost_tables import COSTS, NULL_MOTIONS
+from selfmotion.shell.documents.cost_tables import COSTS, NULL_MOTIONS, AnyCost
 from selfmotion.shell.documents.job_tables import JobTable, SeamTable
+from selfmotion.shell.documents.one_of import OneOf
 from selfmotion.shell.documents.path_tables import PATHS, LeadsTable, WeaveTable
 from selfmotion.shell.documents.problem_table import (
     FollowTable,
@@ -27,7 +32,7 @@ from selfmotion.shell.documents.problem_table import (
     SearchTable,
     ToleranceTable,
 )
-from selfmotion.shell.documents.tables import OneOf, Table
+from selfmotion.shell.documents.tables import Table
 
 POSE = {"position", "rotation", "quaternion", "rpy", "rotation_vector", "normal"}
 PACED = {"feed", "turn_rate", "acceleration", "turn_acceleration", "smoothing", "within", "weave"}
@@ -126,3 +131,27 @@ def test_defaults_are_those_of_python(name: str) -> None:
 def test_an_exception_is_of_a_key_that_there_is() -> None:
     for name, key in DEFAULTS:
         assert key in {**KINDS, **OTHERS}[name][0].model_fields
+
+
+@dataclass(frozen=True)
+class CostOfATest(sm.costs.Cost):
+    """A cost of a user's own."""
+
+    place: SE3
+    speed: float = 1.0
+    name: str = "cost of a test"
+
+
+def test_a_class_of_ones_own_is_read_by_its_signature() -> None:
+    """Keys, units as those of ours, and poses; what it does not know is told by its key."""
+    read = TypeAdapter(AnyCost).validate_python
+    given = {"kind": "CostOfATest", "place": {"position_mm": [1, 2, 3]}, "speed_deg": 90.0}
+    found = read(given).given
+    np.testing.assert_allclose(found["place"].translation, [1e-3, 2e-3, 3e-3])
+    assert found["speed"] == pytest.approx(np.pi / 2)
+    for key in ("sped", "sped_deg", "margin_deg"):
+        with pytest.raises(ValidationError) as refused:
+            read({**given, key: 1.0})
+        (error,) = refused.value.errors()
+        assert error["loc"] == (key,)
+        assert error["msg"].startswith("unknown key, ")

@@ -11,17 +11,9 @@ from selfmotion.basics import FileFormatError, ProblemError
 from selfmotion.model.collision import Obstacle, obstacle_from_dict, obstacle_shapes
 from selfmotion.model.path import pose_of
 from selfmotion.model.task import SE3
-from selfmotion.shell.documents.field_types import (
-    File,
-    Number,
-    Numbers,
-    Pose,
-    PoseTable,
-    Text,
-    key,
-    needed,
-)
-from selfmotion.shell.documents.tables import Context, OneOf, Table
+from selfmotion.shell.documents.field_types import File, Length, Lengths, Number, Text, key, needed
+from selfmotion.shell.documents.one_of import OneOf
+from selfmotion.shell.documents.tables import Context, Pose, PoseTable, Table
 
 _POSE = tuple(PoseTable.model_fields)
 
@@ -72,23 +64,23 @@ class BoxTable(BodyTable):
     """A solid box, its centre at the pose."""
 
     shape: Literal["box"]
-    size: Numbers = needed("Full lengths along the pose's axes [m].")
+    size: Lengths = needed("Full lengths along the pose's axes [m].")
 
 
 class CapsuleTable(BodyTable):
     """All points within `radius` of a segment along the pose's z axis, centred at the pose."""
 
     shape: Literal["capsule"]
-    radius: Number = needed("[m].")
-    length: Number = needed("Of the segment; the caps come on top [m].")
+    radius: Length = needed("[m].")
+    length: Length = needed("Of the segment; the caps come on top [m].")
 
 
 class CylinderTable(BodyTable):
     """A solid cylinder, its centre at the pose and its axis along the pose's z."""
 
     shape: Literal["cylinder"]
-    radius: Number = needed("[m].")
-    length: Number = needed("[m].")
+    radius: Length = needed("[m].")
+    length: Length = needed("[m].")
 
 
 class MeshTable(BodyTable):
@@ -103,7 +95,7 @@ class SphereTable(BodyTable):
     """A solid sphere."""
 
     shape: Literal["sphere"]
-    radius: Number = needed("[m].")
+    radius: Length = needed("[m].")
 
 
 BODIES = OneOf(

@@ -2,20 +2,24 @@
 
 import re
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from selfmotion.basics import FORMER_CLEARANCE, FileFormatError, nearest
-from selfmotion.shell.documents.tables import UNITS, Table, nearest_key
+from selfmotion.shell.documents.one_of import all_tables, unknown_key
+from selfmotion.shell.documents.tables import Table, checks
 
 _Model = TypeVar("_Model", bound=Table)
 # Faults of a file that are told at once.
 _TOLD = 3
+# What has an ending of a key as its unit.
+_MEASURES = {"deg": "angle", "mm": "length"}
 
 
-def checked(model: type[_Model], document: dict[str, Any], written: Mapping[str, Any]) -> _Model:
-    """Return the table of a document in SI units; keys are told as `written` has them.
+def checked(model: type[_Model], document: Mapping[str, Any]) -> _Model:
+    """Return the table of a document.
 
     Raises
     ------
@@ -36,17 +40,15 @@ def checked(model: type[_Model], document: dict[str, Any], written: Mapping[str,
     try:
         return model.model_validate(raw)
     except ValidationError as error:
-        raise FileFormatError(_message(error, model, raw, written)) from error
+        raise FileFormatError(_message(error, model, raw)) from error
 
 
-def _message(
-    error: ValidationError, model: type[Table], raw: Mapping[str, Any], written: Mapping[str, Any]
-) -> str:
+def _message(error: ValidationError, model: type[Table], raw: Mapping[str, Any]) -> str:
     # A key that is misspelt is also missing: what was written says more.
     found = sorted(error.errors(include_url=False), key=lambda item: item["type"] == "missing")
     told = dict.fromkeys(
-        f"{_place(item['loc'], raw)}{unit}: {_what(item, model, raw, unit)}"
-        for item, unit in ((item, _unit(item["loc"], written)) for item in found)
+        f"{_place(item['loc'], raw)}{unit}: {_what(item, model, raw)}"
+        for item, unit in ((item, _unit(item["loc"], raw)) for item in found)
     )
     rest = f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else ""
     return "; ".join(list(told)[:_TOLD]) + rest
@@ -76,10 +78,10 @@ def _unit(location: tuple[int | str, ...], written: Any) -> str:
     key = location[-1] if location else ""
     if not isinstance(inner, Mapping) or key in inner:
         return ""
-    return next((suffix for suffix in UNITS if f"{key}{suffix}" in inner), "")
+    return next((ending for ending in ("_deg", "_mm") if f"{key}{ending}" in inner), "")
 
 
-def _what(error: Any, model: type[Table], raw: Mapping[str, Any], unit: str) -> str:
+def _what(error: Any, model: type[Table], raw: Mapping[str, Any]) -> str:
     context = error.get("ctx", {})
     match error["type"]:
         case "value_error":
@@ -87,7 +89,7 @@ def _what(error: Any, model: type[Table], raw: Mapping[str, Any], unit: str) -> 
         case "missing":
             return "is missing"
         case "extra_forbidden":
-            return "unknown key" + _near(error["loc"], model, raw, unit)
+            return _near(error["loc"], model, raw)
         case "union_tag_not_found":
             tag = context["discriminator"].strip("'")
             return f"has no key '{tag}', which says what it is"
@@ -105,26 +107,27 @@ def _what(error: Any, model: type[Table], raw: Mapping[str, Any], unit: str) -> 
     return str(error["msg"])
 
 
-def _near(
-    location: tuple[int | str, ...], model: type[Table], raw: Mapping[str, Any], unit: str
-) -> str:
+def _near(location: tuple[int | str, ...], model: type[Table], raw: Mapping[str, Any]) -> str:
     """Return what to say of an unknown key: the nearest one, or the tables that have it."""
-    schema = model.model_json_schema()
+    schema, name = model.model_json_schema(), str(location[-1])
     known = _keys_at(location, schema, raw)
-    key = str(location[-1])
-    said = nearest_key(key, known, unit)
+    stem, _, unit = name.rpartition("_")
+    if stem in known and unit in _MEASURES:
+        told = known[stem].get("description", "a table, whose keys have units of their own")
+        return f"'{stem}' is no {_MEASURES[unit]}: {told}"
+    said = unknown_key(name, list(known))
     if len(location) == 1 and "did you mean" not in said:
         # One of a table, at the top of the file.
-        tables = [f"[{name}]" for name in known if key in _keys_at((name, key), schema, {})]
+        tables = [f"[{top}]" for top in known if name in _keys_at((top, name), schema, {})]
         if tables:
-            return f"; it belongs to {' or '.join(tables)}"
+            return f"unknown key; it belongs to {' or '.join(tables)}"
     return said
 
 
 def _keys_at(
     location: tuple[int | str, ...], schema: Mapping[str, Any], raw: Mapping[str, Any]
-) -> list[str]:
-    """Return the keys of the table in which something of a document stands."""
+) -> Mapping[str, Any]:
+    """Return the keys of the table in which something of a document stands, with schemas."""
     node: Any = schema
     value: Any = raw
     for part in location[:-1]:
@@ -134,7 +137,8 @@ def _keys_at(
             node = node.get("properties", {}).get(part) or node.get("additionalProperties") or {}
             value = value.get(part) if isinstance(value, Mapping) else None
         node = _chosen(node, value, schema["$defs"])
-    return list(node.get("properties", {}))
+    found: dict[str, Any] = node.get("properties", {})
+    return found
 
 
 def _chosen(node: Any, value: Any, known: Mapping[str, Any]) -> Any:
@@ -151,3 +155,27 @@ def _chosen(node: Any, value: Any, known: Mapping[str, Any]) -> Any:
             node = next((item for item in node["anyOf"] if form in item), {})
         else:
             return node
+
+
+def key_of_joint_degrees(document: Any, where: str = "") -> str:
+    """Return the first key that gives degrees joint by joint, "" for none."""
+    items: Any = ()
+    if isinstance(document, Mapping):
+        items = document.items()
+    elif isinstance(document, list):
+        items = enumerate(document)
+    for key, value in items:
+        # Where a joint slides, degrees make no sense.
+        if isinstance(value, list) and key in _joint_degrees():
+            return f"{where}{key}"
+        inner = key_of_joint_degrees(value, f"{where}{key}.")
+        if inner:
+            return inner
+    return ""
+
+
+@cache
+def _joint_degrees() -> set[str]:
+    """Return the keys in degrees of all tables that have a number for each joint."""
+    fields = (item for table in all_tables() for item in table.model_fields.items())
+    return {f"{name}_deg" for name, info in fields if getattr(checks(info), "per_joint", False)}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, model_validator
 
 from selfmotion.basics import restore
 from selfmotion.model.collision import Obstacle, disabled_links, srdf_notes
@@ -14,10 +14,15 @@ from selfmotion.model.task import Damping, Relaxation
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.shell.documents.body_tables import StandingBody
 from selfmotion.shell.documents.field_types import (
+    Angle,
     AnyTable,
     Axis,
     File,
     Flag,
+    Joints,
+    Length,
+    LengthOrAngle,
+    Lengths,
     Names,
     Number,
     Numbers,
@@ -25,7 +30,8 @@ from selfmotion.shell.documents.field_types import (
     key,
     needed,
 )
-from selfmotion.shell.documents.tables import Context, OneOf, Table
+from selfmotion.shell.documents.one_of import OneOf
+from selfmotion.shell.documents.tables import Context, Table, refused
 
 _UNUSED = "Share of the limit that is aimed to be left unused; at least half of it is."
 
@@ -52,8 +58,8 @@ class BandConstraint(ConstraintTable):
 
     kind: Literal["Band"]
     coordinate: AnyTable = needed("`JointCoordinate`, `FrameCoordinate` or `SwivelAngle`.")
-    center: Number = needed("The middle of the band [rad or m].")
-    half: Number = needed("How far it reaches to each side; less than π for an angle [rad or m].")
+    center: LengthOrAngle = needed("The middle of the band [rad or m].")
+    half: LengthOrAngle = needed("How far it reaches to each side, less than π [rad or m].")
     margin: Number = key(_UNUSED, 5e-4)
 
 
@@ -68,28 +74,28 @@ class EndAccelerationConstraint(ConstraintTable):
     """The motion ends with a joint acceleration; see `StartAcceleration`."""
 
     kind: Literal["EndAcceleration"]
-    qdd: Numbers = key("q̈(T) [rad/s² or m/s²].", 0.0)
+    qdd: Joints = key("q̈(T) [rad/s² or m/s²].", 0.0)
 
 
 class EndConfigurationConstraint(ConstraintTable):
     """The motion ends in a configuration that puts the tool on the end of the path."""
 
     kind: Literal["EndConfiguration"]
-    q: Numbers = needed("q(T) [rad or m].")
+    q: Joints = needed("q(T) [rad or m].")
 
 
 class EndVelocityConstraint(ConstraintTable):
     """The motion ends with a joint velocity; 0 for rest."""
 
     kind: Literal["EndVelocity"]
-    qd: Numbers = key("q̇(T) [rad/s or m/s].", 0.0)
+    qd: Joints = key("q̇(T) [rad/s or m/s].", 0.0)
 
 
 class JointAccelerationConstraint(ConstraintTable):
     """Joint accelerations stay below limits."""
 
     kind: Literal["JointAccelerationLimits"]
-    limit: Numbers = key("[rad/s² or m/s²]; by default those of the arm's maker, if known.")
+    limit: Joints = key("[rad/s² or m/s²]; by default those of the arm's maker, if known.")
     margin: Number = key(_UNUSED, 1e-4)
     replace: Flag = key("Whether these replace the maker's. By default both apply.", False)
 
@@ -98,7 +104,7 @@ class JointJerkConstraint(ConstraintTable):
     """Joint jerks, the derivatives of accelerations, stay below limits."""
 
     kind: Literal["JointJerkLimits"]
-    limit: Numbers = key("[rad/s³ or m/s³]; by default those of the arm's maker, if known.")
+    limit: Joints = key("[rad/s³ or m/s³]; by default those of the arm's maker, if known.")
     margin: Number = key(_UNUSED, 1e-4)
     replace: Flag = key("Whether these replace the maker's. By default both apply.", False)
 
@@ -107,9 +113,9 @@ class JointPositionConstraint(ConstraintTable):
     """Joint coordinates stay within limits."""
 
     kind: Literal["JointPositionLimits"]
-    lower: Numbers = key("[rad or m]; -inf for none. By default only the URDF's.")
-    upper: Numbers = key("[rad or m]; inf for none. By default only the URDF's.")
-    margin: Number = key("Target distance from them [rad or m]; at least half is kept.", 1e-5)
+    lower: Joints = key("[rad or m]; -inf for none. By default only the URDF's.")
+    upper: Joints = key("[rad or m]; inf for none. By default only the URDF's.")
+    margin: Angle = key("Target distance from them [rad or m]; at least half is kept.", 1e-5)
     replace: Flag = key("Whether these replace the URDF's. By default both apply.", False)
 
 
@@ -119,7 +125,7 @@ class JointTorqueConstraint(ConstraintTable):
     kind: Literal["JointTorqueLimits"]
     limit: Numbers = key("[Nm, or N of prismatic joints]; by default the URDF's efforts.")
     payload: Number = key("Mass that the tool holds [kg].", 0.0)
-    center: Numbers = key("Its centre of mass in the tool frame [m].")
+    center: Lengths = key("Its centre of mass in the tool frame [m].")
     inertia: Numbers = key(
         "Its inertia about that centre, along the tool's axes [kg m²]; by default a point mass."
     )
@@ -130,7 +136,7 @@ class JointVelocityConstraint(ConstraintTable):
     """Joint speeds stay below limits."""
 
     kind: Literal["JointVelocityLimits"]
-    limit: Numbers = key("[rad/s or m/s]; by default only the URDF's.")
+    limit: Joints = key("[rad/s or m/s]; by default only the URDF's.")
     margin: Number = key(_UNUSED, 1e-4)
     replace: Flag = key("Whether these replace the URDF's. By default both apply.", False)
 
@@ -139,13 +145,13 @@ class PositionDependentVelocityConstraint(ConstraintTable):
     """Joints get slower towards the ends of their ranges (position-based velocity limits)."""
 
     kind: Literal["PositionDependentVelocityLimits"]
-    deceleration: Numbers = key("a [rad/s² or m/s²]; by default that of the maker, if known.")
-    offset: Numbers = key("o [rad/s or m/s]; by default the maker's, or 0 beside a deceleration.")
-    lower: Numbers = key(
+    deceleration: Joints = key("a [rad/s² or m/s²]; by default that of the maker, if known.")
+    offset: Joints = key("o [rad/s or m/s]; by default the maker's, or 0 beside a deceleration.")
+    lower: Joints = key(
         "Where the lower square root is 0 [rad or m], -inf for a joint without a curve; by default "
         "the maker's, or the URDF's limits beside a given deceleration."
     )
-    upper: Numbers = key("Where the upper square root is 0 [rad or m]; likewise.")
+    upper: Joints = key("Where the upper square root is 0 [rad or m]; likewise.")
     margin: Number = key(
         "Share of the distance in which a joint stops from its highest speed that is aimed to be "
         "left unused; at least half of it is. By default more than libfranka's tolerance of "
@@ -158,14 +164,14 @@ class StartAccelerationConstraint(ConstraintTable):
     """The motion starts with a joint acceleration: with `StartVelocity`, an arm is taken over."""
 
     kind: Literal["StartAcceleration"]
-    qdd: Numbers = key("q̈(0) [rad/s² or m/s²].", 0.0)
+    qdd: Joints = key("q̈(0) [rad/s² or m/s²].", 0.0)
 
 
 class StartVelocityConstraint(ConstraintTable):
     """The motion starts with a joint velocity: that of an arm that moves already."""
 
     kind: Literal["StartVelocity"]
-    qd: Numbers = key("q̇(0) [rad/s or m/s].", 0.0)
+    qd: Joints = key("q̇(0) [rad/s or m/s].", 0.0)
 
 
 class TiltConstraint(ConstraintTable):
@@ -174,7 +180,7 @@ class TiltConstraint(ConstraintTable):
     kind: Literal["Tilt"]
     frame: Text = needed("The link.")
     axis: Axis = key("In the link's own frame.", "z")
-    within: Number = key("The largest angle [rad], less than π.", 0.1)
+    within: Angle = key("The largest angle [rad], less than π.", 0.1)
     # Python has a default: down suits a torch, and is upside down for a table.
     towards: Numbers = needed("The direction, in world axes.")
     margin: Number = key(_UNUSED, 5e-4)
@@ -184,10 +190,10 @@ class ToolConstraint(ConstraintTable):
     """The tool moves and turns no faster, and accelerates no more, than it may."""
 
     kind: Literal["ToolLimits"]
-    speed: Number = key("Of the tool frame's origin [m/s].", math.inf)
-    turn_rate: Number = key("[rad/s].", math.inf)
-    acceleration: Number = key("[m/s²].", math.inf)
-    turn_acceleration: Number = key("[rad/s²].", math.inf)
+    speed: Length = key("Of the tool frame's origin [m/s].", math.inf)
+    turn_rate: Angle = key("[rad/s].", math.inf)
+    acceleration: Length = key("[m/s²].", math.inf)
+    turn_acceleration: Angle = key("[rad/s²].", math.inf)
     margin: Number = key(_UNUSED, 1e-3)
 
 
@@ -195,7 +201,7 @@ class ClearanceTable(Table):
     """The arm and attached bodies have a minimum distance from obstacles and from each other."""
 
     obstacles: list[StandingBody] = key("Obstacles in the world, and bodies attached to links.", [])
-    distance: Number = key("Smallest distance [m].", 5e-3)
+    distance: Length = key("Smallest distance [m].", 5e-3)
     disabled: list[Names] = key("Pairs of links or obstacles that are left out.", [])
     srdf: File = key("File whose `disable_collisions` are left out as well.")
 
@@ -239,9 +245,24 @@ class RelaxationTable(Table):
     """Rows in which the tool may leave the path, by how much, and when."""
 
     rows: Names = needed("All of x, y, z or all of rx, ry, rz.")
-    band: Number = key("Largest deviation [m or rad]; by default the rows are free.", math.inf)
+    band: LengthOrAngle = key("Largest deviation [m or rad]; by default any.", math.inf)
     during: Numbers = key("First and last time of the window [s]; by default the whole motion.")
     axes: Text = key("Of x, y and z; rotations are in tool axes always.", "world")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_unit(cls, value: Any) -> Any:
+        """Refuse a band in mm of rows that turn, and one in degrees of rows that do not."""
+        rows = value.get("rows") if isinstance(value, Mapping) else None
+        for row in [rows] if isinstance(rows, str) else rows if isinstance(rows, list) else ():
+            for rows_of, what, wrong, right in (
+                (("rx", "ry", "rz"), "an angle", "band_mm", "band_deg"),
+                (("x", "y", "z"), "a length", "band_deg", "band_mm"),
+            ):
+                if row in rows_of and wrong in value:
+                    said = f"row '{row}' is {what}; say {right}"
+                    raise refused(wrong, value[wrong], said)
+        return value
 
     def build(self, _context: Context) -> Relaxation:
         """Return the relaxation."""

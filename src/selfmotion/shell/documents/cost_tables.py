@@ -9,15 +9,20 @@ from selfmotion.basics import restore
 from selfmotion.model.motion import NullMotion
 from selfmotion.problem.costs import Cost, FunctionCost, Scaled
 from selfmotion.shell.documents.field_types import (
+    Angle,
     AnyTable,
+    Joints,
+    LengthOrAngle,
     Number,
     Numbers,
+    Rates,
     Text,
     Whole,
     key,
     needed,
 )
-from selfmotion.shell.documents.tables import Context, OneOf, Table
+from selfmotion.shell.documents.one_of import OneOf
+from selfmotion.shell.documents.tables import Context, Table
 
 # The kind of a cost that is a function.
 FUNCTION = "function"
@@ -110,8 +115,8 @@ class JointLimitDistanceCost(MultipliedCost):
     """Distance from the joint limits: G = μ Σ_i ((q_i - c_i) / h_i)^p."""
 
     kind: Literal["JointLimitDistance"]
-    lower: Numbers = key("Lower limits [rad or m]; by default those of the arm's URDF.")
-    upper: Numbers = key("Upper limits [rad or m]; by default those of the arm's URDF.")
+    lower: Joints = key("Lower limits [rad or m]; by default those of the arm's URDF.")
+    upper: Joints = key("Upper limits [rad or m]; by default those of the arm's URDF.")
     power: Whole = key("p, even.", 6)
 
 
@@ -120,7 +125,7 @@ class JointReversalsCost(NamedCost):
 
     kind: Literal["JointReversals"]
     weight: Number = key("w, the cost of a reversal.", 1.0)
-    speed: Number = key("v [rad/s or m/s]: a joint that is slower nearly rests.", 0.02)
+    speed: LengthOrAngle = key("v [rad/s or m/s]: a joint that is slower nearly rests.", 0.02)
     smoothing: Number = key("δ [1/s]: changes slower than that cost next to nothing.", 0.05)
 
 
@@ -144,8 +149,8 @@ class LimitUseCost(NamedCost):
     """Use of limits by the fastest joint: G = (Σ|q̇ᵢ/vᵢ|ᵖ + Σ|q̈ᵢ/aᵢ|^(p/2))^(1/p)."""
 
     kind: Literal["LimitUse"]
-    velocity: Numbers = needed("v [rad/s or m/s].")
-    acceleration: Numbers = key("a [rad/s² or m/s²]; by default none.", math.inf)
+    velocity: Rates = needed("v [rad/s or m/s].")
+    acceleration: Rates = key("a [rad/s² or m/s²]; by default none.", math.inf)
     power: Number = key("p, at least 4.", 8.0)
 
 
@@ -159,7 +164,7 @@ class PathLengthCost(NamedCost):
     """Length of the joint path, joint by joint: G = Σ_i w_i (√(q̇_i² + δ²) - δ) [rad/s]."""
 
     kind: Literal["PathLength"]
-    smoothing: Number = key("δ [rad/s]; the integral is too small by at most nδT.", 0.01)
+    smoothing: Angle = key("δ [rad/s]; the integral is too small by at most nδT.", 0.01)
     joint_weights: Numbers = key(
         "w ≥ 0, such as `RobotModel.joint_weights`; 1 for every joint by default, which adds up "
         "radians only: an arm with prismatic joints has to be given some."
@@ -170,7 +175,7 @@ class PostureCost(WeightedCost):
     """Distance from a posture: G = ½ (q - q*)ᵀW(q - q*) [rad²]."""
 
     kind: Literal["Posture"]
-    posture: Numbers = key("q* [rad or m].")
+    posture: Joints = key("q* [rad or m].")
 
 
 class ScaledCost(CostTable):
@@ -197,7 +202,7 @@ class TowardsCost(NamedCost):
 
     kind: Literal["Towards"]
     coordinate: AnyTable = needed("`JointCoordinate`, `FrameCoordinate` or `SwivelAngle`.")
-    target: Number = needed("c* [rad or m].")
+    target: LengthOrAngle = needed("c* [rad or m].")
     weight: Number = key("w ≥ 0.", 1.0)
 
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from pydantic_core import CoreSchema, core_schema
 
-from selfmotion.basics import PathError, is_number
-from selfmotion.model.path import ORIENTATIONS, pose_of
-from selfmotion.model.task import SE3
+from selfmotion.basics import is_number
 
 # No angle, length, weight or time is beyond this, and its square is a number still.
 _HUGE = 1e15
@@ -32,10 +30,25 @@ def needed(told: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """Makes a type of a function that returns a value or refuses it, and of its JSON Schema."""
+    """Makes a type of a function that returns a value or refuses it, and of its JSON Schema.
+
+    Attributes
+    ----------
+    check : callable
+    schema : dict
+    units : tuple of str
+        Endings of the key in other units.
+    per_joint : bool
+        Whether a list of it has a number for each joint.
+    within_turn : bool
+        Whether more than a turn can only be meant in degrees.
+    """
 
     check: Callable[[Any], Any]
     schema: Mapping[str, Any]
+    units: tuple[str, ...] = ()
+    per_joint: bool = False
+    within_turn: bool = False
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.check)
@@ -79,13 +92,6 @@ def _numbers(value: Any) -> Any:
     return value
 
 
-def _pose(value: Any) -> Any:
-    try:
-        return pose_of(value)
-    except PathError as error:
-        raise ValueError(str(error)) from error
-
-
 def _axis(value: Any) -> Any:
     if isinstance(value, str):
         if value not in "xyz" or len(value) != 1:
@@ -126,46 +132,33 @@ def _start(value: Any) -> Any:
 _NUMBER = {"type": "number"}
 _TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
 _STRINGS = {"type": "array", "items": {"type": "string"}}
+_ONE = (_of_kind((int, float), "a number"), _NUMBER)
+_SOME = (_numbers, {"anyOf": [_NUMBER, {"type": "array"}]})
+_LISTED = (_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})
+_START = {"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}
 
-Number = Annotated[float, Checked(_of_kind((int, float), "a number"), _NUMBER)]
+# A number: without a unit, and of a length, an angle or either, or a rate of it.
+Number = Annotated[float, Checked(*_ONE)]
+Length = Annotated[float, Checked(*_ONE, ("_mm",))]
+Angle = Annotated[float, Checked(*_ONE, ("_deg",))]
+Turn = Annotated[float, Checked(*_ONE, ("_deg",), within_turn=True)]
+LengthOrAngle = Annotated[float, Checked(*_ONE, ("_deg", "_mm"))]
+# A number, or a list of numbers; those of joints are one for all, or one for each.
+Numbers = Annotated[Any, Checked(*_SOME)]
+Lengths = Annotated[Any, Checked(*_SOME, ("_mm",))]
+Turns = Annotated[Any, Checked(*_SOME, ("_deg",), within_turn=True)]
+Joints = Annotated[Any, Checked(*_SOME, ("_deg",), per_joint=True)]
+Rates = Annotated[Any, Checked(*_SOME, ("_deg", "_mm"))]
+Coordinates = Annotated[
+    dict[str, float], Checked(_coordinates, {"type": "object"}, ("_deg",), per_joint=True)
+]
+Start = Annotated[Any, Checked(_start, _START, ("_deg",), per_joint=True)]
+Axis = Annotated[Any, Checked(_axis, {"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})]
 Whole = Annotated[int, Checked(_of_kind(int, "a whole number"), {"type": "integer"})]
 Flag = Annotated[bool, Checked(_of_kind(bool, "true or false"), {"type": "boolean"})]
 Text = Annotated[str, Checked(_of_kind(str, "a text"), {"type": "string"})]
 File = Annotated[str, Checked(_of_kind(str, "the name of a file"), {"type": "string"})]
-Files = Annotated[list[str], Checked(_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})]
-AnyTable = Annotated[dict[str, Any], Checked(_of_kind(Mapping, "a table"), {"type": "object"})]
-Numbers = Annotated[Any, Checked(_numbers, {"anyOf": [_NUMBER, {"type": "array"}]})]
-Axis = Annotated[Any, Checked(_axis, {"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})]
-Coordinates = Annotated[dict[str, float], Checked(_coordinates, {"type": "object"})]
-Names = Annotated[list[str], Checked(_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})]
+Files = Annotated[list[str], Checked(*_LISTED)]
+Names = Annotated[list[str], Checked(*_LISTED)]
 SeveralNames = Annotated[list[str], Checked(_several_names, _STRINGS)]
-Start = Annotated[
-    Any, Checked(_start, {"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]})
-]
-
-_OF_THE_AXES = f"of the axes; one of {', '.join([*ORIENTATIONS][:-1])} and {[*ORIENTATIONS][-1]}."
-
-
-class PoseTable(BaseModel):
-    """A pose: a position, and an orientation in one of several ways; or a 4 × 4 matrix."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    position: Numbers = key("Of the origin [m].")
-    rotation: Numbers = key(f"3 × 3 matrix {_OF_THE_AXES}")
-    quaternion: Numbers = key(f"w, x, y, z {_OF_THE_AXES}")
-    rpy: Numbers = key(f"Roll, pitch and yaw [rad] {_OF_THE_AXES}")
-    rotation_vector: Numbers = key(f"Axis times angle [rad] {_OF_THE_AXES}")
-    normal: Numbers = key("Direction of the z axis, instead of an orientation.")
-
-
-class _Posed:
-    """Makes a type of poses: a table of a position and an orientation, or a matrix."""
-
-    def __get_pydantic_core_schema__(self, _source: Any, handler: Any) -> CoreSchema:
-        matrix = Annotated[list[Any], Field(min_length=4, max_length=4)]
-        written = handler.generate_schema(matrix | PoseTable)
-        return core_schema.no_info_plain_validator_function(_pose, json_schema_input_schema=written)
-
-
-Pose = Annotated[SE3, _Posed()]
+AnyTable = Annotated[dict[str, Any], Checked(_of_kind(Mapping, "a table"), {"type": "object"})]

@@ -18,6 +18,7 @@ from selfmotion.shell.documents.body_tables import AnyBody, WorkpieceTable
 from selfmotion.shell.documents.field_types import (
     Checked,
     Flag,
+    Length,
     Number,
     SeveralNames,
     Start,
@@ -26,10 +27,11 @@ from selfmotion.shell.documents.field_types import (
     key,
     needed,
 )
+from selfmotion.shell.documents.one_of import Either
 from selfmotion.shell.documents.path_tables import Events, FilePoses, ToolMotion, after
 from selfmotion.shell.documents.problem_table import PartTable, SharedTable, start_of
 from selfmotion.shell.documents.seam_job import SeamJob
-from selfmotion.shell.documents.tables import Context, Either, Table
+from selfmotion.shell.documents.tables import Context, Table
 from selfmotion.shop.cam import UNJUDGED, read_seams, times_of_events
 from selfmotion.work.job import FASTEST_FEED, Seam, problem_of_seam
 
@@ -56,7 +58,8 @@ _Events = Annotated[
     list[Any],
     Checked(_listed, {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}),
 ]
-_Feed = Annotated[Any, Checked(_feed, {"anyOf": [{"type": "number"}, {"const": HIGHEST}]})]
+_FEED = {"anyOf": [{"type": "number"}, {"const": HIGHEST}]}
+_Feed = Annotated[Any, Checked(_feed, _FEED, ("_mm",))]
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ class SeamsFile(FilePoses, SeamKeys):
         'Speed of the tool [m/s], from rest to rest, where the file has no times; or "highest", '
         "the highest one at which all are kept."
     )
-    most_feed: Number = key('With feed = "highest": no more than this [m/s].')
+    most_feed: Length = key('With feed = "highest": no more than this [m/s].')
     run_up: Flag = key(
         "Whether the tool runs up before the seam and stops behind it, so that it has its feed "
         "from begin to end.",

@@ -215,7 +215,7 @@ def moved_workpiece(document: Mapping[str, Any], by: SE3) -> dict[str, Any]:
     in which its paths are.
     """
     piece = document.get("workpiece", {})
-    frame = in_si(piece).get("frame")
-    place = by * (SE3.Identity() if frame is None else pose_of(frame))
+    frame = piece.get("frame", {})
+    place = by * pose_of(in_si(frame) if isinstance(frame, Mapping) else frame)
     stands = {"position": place.translation.tolist(), "rotation": place.rotation.tolist()}
     return {**document, "workpiece": {**piece, "frame": stands}}

@@ -23,17 +23,21 @@ from selfmotion.model.path import (
 )
 from selfmotion.model.task import SE3
 from selfmotion.shell.documents.field_types import (
+    Angle,
     File,
     Flag,
+    Length,
+    Lengths,
     Names,
     Number,
     Numbers,
-    Pose,
     Text,
+    Turn,
     key,
     needed,
 )
-from selfmotion.shell.documents.tables import Context, OneOf, Table
+from selfmotion.shell.documents.one_of import OneOf
+from selfmotion.shell.documents.tables import Context, Pose, Table
 from selfmotion.shop.cam import Reading, one_seam, read_path, times_of_events
 
 TimeLaw = Literal["constant", "minimum_jerk"]
@@ -44,7 +48,7 @@ Events = list[tuple[str, float]]
 class LeadsTable(Table):
     """An approach and a retract along an axis of the tool."""
 
-    length: Number = needed("Of each lead [m].")
+    length: Length = needed("Of each lead [m].")
     duration: Number = needed("Of each lead [s].")
     axis: Numbers = key("Direction of the retract in the tool's frame; by default back along z.")
 
@@ -77,8 +81,8 @@ def rapid_ends(path: Path) -> tuple[bool, bool]:
 class WeaveTable(Table):
     """Swings of the tool beside a path, as welders make them."""
 
-    amplitude: Number = needed("How far the tool goes to each side [m].")
-    pitch: Number = needed("Length of a swing there and back [m], about: a whole number fits.")
+    amplitude: Length = needed("How far the tool goes to each side [m].")
+    pitch: Length = needed("Length of a swing there and back [m], about: a whole number fits.")
     axis: Numbers = key("Direction of the swing in the tool's frame.")
     dwell: Number = key(
         "Share of a swing that the tool stays at each edge, from 0 to below 0.5. With 0 it is a "
@@ -207,9 +211,9 @@ def framed(place: SE3 | None, frame: SE3 | None) -> SE3 | None:
 class BoundsTable(Table):
     """Bounds of a feed."""
 
-    turn_rate: Number = key("The tool turns no faster than this [rad/s].", 1.0)
-    acceleration: Number = key("It accelerates no more than this [m/s²].", 1.0)
-    turn_acceleration: Number = key("Likewise its turning [rad/s²].", 10.0)
+    turn_rate: Angle = key("The tool turns no faster than this [rad/s].", 1.0)
+    acceleration: Length = key("It accelerates no more than this [m/s²].", 1.0)
+    turn_acceleration: Angle = key("Likewise its turning [rad/s²].", 10.0)
     smoothing: Number = key("How long an acceleration takes to build up [s].", 0.05)
     within: Number = key(
         "Allowed relative error of the feed, except in run-up, run-down and rounded corners: a "
@@ -228,7 +232,7 @@ class ShapePath(FramedPath, BoundsTable):
 
     start: Pose = key("Pose of the tool at the start [m]; by default that of the arm's start.")
     duration: Number = key("Length of the motion [s]; or give a feed.")
-    feed: Number = key("Speed of the tool [m/s]; or give a duration.")
+    feed: Length = key("Speed of the tool [m/s]; or give a duration.")
     weave: WeaveTable = key()
 
     def build(self, context: Context, place: SE3 | None = None) -> Path:
@@ -280,8 +284,8 @@ class CirclePath(ShapePath):
     """A circle, or an arc, about an axis."""
 
     kind: Literal["circle"]
-    center: Numbers = key("A point on the axis [m]; or give the radius.")
-    radius: Number = key("[m], where the centre follows from the start; or give the centre.")
+    center: Lengths = key("A point on the axis [m]; or give the radius.")
+    radius: Length = key("[m], where the centre follows from the start; or give the centre.")
     normal: Numbers = key(
         "Direction of the axis; the tool moves counter-clockwise about it.", [0.0, 0.0, 1.0]
     )
@@ -303,7 +307,7 @@ class LinePath(ShapePath):
 
     kind: Literal["line"]
     end: Pose = key("Pose of the tool at the end [m]; or give by.")
-    by: Numbers = key("How far it goes from the start [m]; or give the end.")
+    by: Lengths = key("How far it goes from the start [m]; or give the end.")
     time_law: TimeLaw = key("Speed along it.", "minimum_jerk")
 
     def shape(self, start: SE3, duration: float) -> Path:
@@ -322,11 +326,11 @@ class SpiralPath(ShapePath):
     """A spiral of Archimedes about an axis, or a helix: each turn is as far from the one before."""
 
     kind: Literal["spiral"]
-    center: Numbers = needed("A point on the axis [m].")
+    center: Lengths = needed("A point on the axis [m].")
     normal: Numbers = needed("Direction of the axis; the tool moves counter-clockwise about it.")
     turns: Number = needed("Number of turns; negative for clockwise.")
-    radius: Number = needed("Distance from the axis at the end [m].")
-    rise: Number = key("How far the end is along the axis from the start [m].", 0.0)
+    radius: Length = needed("Distance from the axis at the end [m].")
+    rise: Length = key("How far the end is along the axis from the start [m].", 0.0)
     turn_tool: Flag = key("Whether the tool turns with it; else its orientation stays.", False)
     time_law: TimeLaw = key("Speed along it.", "minimum_jerk")
 
@@ -340,7 +344,7 @@ class FilePoses(FrameKeys, BoundsTable):
     """How poses of a file are read, whichever seam they are of; see `read_path`."""
 
     file: File = needed("The file of poses; see [paths from files](howto/seam.md).")
-    feed: Number = key("Speed of the tool [m/s], from rest to rest, where the file has no times.")
+    feed: Length = key("Speed of the tool [m/s], from rest to rest, where the file has no times.")
     duration: Number = key(
         "Or the time of the whole motion [s], from rest to rest, at about constant speed between."
     )
@@ -353,9 +357,9 @@ class FilePoses(FrameKeys, BoundsTable):
         "pass it within `tolerance` between straight legs (round).",
         "blend",
     )
-    tolerance: Number = key("How far the tool may pass from a corner [m].", 1e-3)
-    corner_angle: Number = key("Change of direction that counts as a kink [rad].", np.pi / 6)
-    jump: Number = key("Distance from one pose to the next [m] that is refused.", 0.5)
+    tolerance: Length = key("How far the tool may pass from a corner [m].", 1e-3)
+    corner_angle: Turn = key("Change of direction that counts as a kink [rad].", np.pi / 6)
+    jump: Length = key("Distance from one pose to the next [m] that is refused.", 0.5)
     weave: WeaveTable = key()
     columns: Names = key(
         "Names of the columns of a table or of an array, in place of a header or where there is "
@@ -364,22 +368,22 @@ class FilePoses(FrameKeys, BoundsTable):
     flip_normals: Flag = key(
         "Whether `nx,ny,nz` point out of the part, as surface normals of CAD do.", False
     )
-    standoff: Number = key("How far the tip is held back from the poses, along its z [m].", 0.0)
+    standoff: Length = key("How far the tip is held back from the poses, along its z [m].", 0.0)
     along: Text = key(
         "Which axis of the tool is along the path (x, -x, y, -y), as of a knife or a nozzle; its z "
         "axis is that of the file, or points down. Legs are straight; in corners the tool turns on "
         'the spot (corners "stop") or within `tolerance` ("round"), and in bends smaller than '
         "`corner_angle` on its way."
     )
-    lead: Number = key(
+    lead: Angle = key(
         "By how much its z axis leans towards where it goes then [rad]; below 0 it lags.", 0.0
     )
-    tilt: Number = key(
+    tilt: Angle = key(
         "By how much it leans to the left of where it goes, seen from the holder [rad]; below 0 to "
         "the right.",
         0.0,
     )
-    lift: Number = key(
+    lift: Length = key(
         "How far the tool leaves corners along its own z axis, before `lead` and `tilt`, to turn "
         'there and come back [m], with corners "stop". It is lifted at no feed that is judged.',
         0.0,
@@ -395,7 +399,7 @@ class FilePoses(FrameKeys, BoundsTable):
         '841); ["B", "-C"] where a positive C turns the table right-handed. With rotary = "head" '
         "the axes of a table under tool centre point control."
     )
-    rotary_center: Numbers = key(
+    rotary_center: Lengths = key(
         "A point on all of a table's axes, in the program's coordinates [m]."
     )
     unit: Text = key("Of a drawing or APT that says none, or another one than it is written in.")
@@ -473,7 +477,7 @@ class FeedPath(FramedPath, BoundsTable):
 
     kind: Literal["feed"]
     path: ToolMotion = needed("Where the tool goes; its own pace does not matter.")
-    feed: Number = needed("Speed of the tool [m/s].")
+    feed: Length = needed("Speed of the tool [m/s].")
     stretches: list[Numbers] = key(
         "Times of the original [s], increasing, and the feed from each of them on [m/s], `feed` "
         "before the first. Before a slower feed starts, the tool has slowed down."
@@ -507,7 +511,7 @@ class PlacedPath(PathTable):
 class PosesPath(FramedPath):
     """A tool motion through poses."""
 
-    positions: Numbers = needed("[m].")
+    positions: Lengths = needed("[m].")
     quaternions: Any = key("w, x, y, z of each pose, or 3 × 3 matrices; by default none.")
     quaternions_wxyz: Any = key("The same, as Python calls it.")
 
@@ -516,8 +520,8 @@ class PolylinePath(PosesPath):
     """Straight legs from pose to pose; corners are rounded within tolerances."""
 
     kind: Literal["polyline"]
-    tolerance: Number = key("How far the tool may pass from a corner [m].", 1e-3)
-    turn_tolerance: Number = key("Likewise [rad].", 1e-2)
+    tolerance: Length = key("How far the tool may pass from a corner [m].", 1e-3)
+    turn_tolerance: Turn = key("Likewise [rad].", 1e-2)
 
 
 class RetimedPath(PathTable):
@@ -572,7 +576,7 @@ class WaypointsPath(PosesPath):
         "(stop). Either way each waypoint is reached at its time.",
         "blend",
     )
-    corner_angle: Number = key(
+    corner_angle: Turn = key(
         "Change of direction from one leg to the next, of motion or of rotation, that counts as a "
         "kink [rad].",
         np.pi / 6,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from selfmotion.basics import (
-    PER_JOINT,
     FileFormatError,
     ProblemError,
     as_path,
-    in_si,
     read_document,
 )
 from selfmotion.planning.planner import PlanRequest
@@ -88,12 +87,12 @@ def built(
     FileFormatError
         The document is not what its model says, or cannot be planned.
     """
-    from selfmotion.shell.documents.checking import checked
+    from selfmotion.shell.documents.checking import checked, key_of_joint_degrees
     from selfmotion.shell.documents.own_code import import_own
     from selfmotion.shell.documents.tables import Context
 
     context = Context(file, cache={} if cache is None else cache, notes=list(notes))
-    context.degrees_key = _key_of_joint_degrees(document)
+    context.degrees_key = key_of_joint_degrees(document)
     with context.naming():
         if ("seams" in document or "job" in document) and "seams" not in model.model_fields:
             raise ProblemError(
@@ -101,26 +100,7 @@ def built(
                 "motions only its own .program is judged by it: `selfmotion check a.program`; of "
                 "programs of controllers what was made of that: `check a.src --robot a.program`"
             )
-        raw = in_si(document)
+        raw = deepcopy(dict(document))
         context.functions = import_own(raw, context.beside(""), allow_code)
-        table = checked(model, raw, document)
+        table = checked(model, raw)
     return table.build(context)
-
-
-def _key_of_joint_degrees(document: Any, where: str = "") -> str:
-    """Return the first key that gives degrees joint by joint, "" for none."""
-    items: Any = ()
-    if isinstance(document, Mapping):
-        items = document.items()
-    elif isinstance(document, list):
-        items = enumerate(document)
-    for key, value in items:
-        # Where a joint slides, degrees make no sense.
-        name = str(key)
-        is_per_joint = name.endswith("_deg") and name.removesuffix("_deg") in PER_JOINT
-        if is_per_joint and isinstance(value, list):
-            return f"{where}{key}"
-        inner = _key_of_joint_degrees(value, f"{where}{key}.")
-        if inner:
-            return inner
-    return ""

@@ -35,19 +35,21 @@ from selfmotion.shell.documents.field_types import (
     File,
     Files,
     Flag,
+    Length,
     Number,
     Numbers,
-    Pose,
     Start,
     Text,
+    Turn,
     Whole,
     key,
     needed,
 )
 from selfmotion.shell.documents.joint_limits import joint_limit_notes, read_joint_limits
+from selfmotion.shell.documents.one_of import Either
 from selfmotion.shell.documents.path_tables import ToolMotion
 from selfmotion.shell.documents.robot_tables import RobotTable
-from selfmotion.shell.documents.tables import Context, Either, Table
+from selfmotion.shell.documents.tables import Context, Pose, Table
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 # Note on a file that says a clearance as one of its constraints.
@@ -118,8 +120,8 @@ class SearchTable(Table):
 class ToleranceTable(Table):
     """Allowed error of a verified motion from the path, at any time."""
 
-    position: Number = key("[m].", 1e-6)
-    rotation: Number = key("[rad].", 1e-6)
+    position: Length = key("[m].", 1e-6)
+    rotation: Turn = key("[rad].", 1e-6)
 
     def build(self, _context: Context) -> Tolerance:
         """Return the tolerance."""
@@ -168,7 +170,7 @@ class QuasiNewtonTable(Table):
 class InPartsTable(Table):
     """How a motion in parts leaves and meets the path."""
 
-    retreat: Number = key(
+    retreat: Length = key(
         "Distance that the tool leaves the path along `axis` before each move, and returns by "
         "[m]; by default the move starts on the path.",
         0.0,

@@ -29,11 +29,10 @@ from selfmotion.shell.documents.field_types import (
     File,
     Files,
     Names,
-    Pose,
     Text,
     key,
 )
-from selfmotion.shell.documents.tables import Context, Table
+from selfmotion.shell.documents.tables import Context, Pose, Table
 
 _KNOWN = {**NAMED_ARMS, **NAMED_PARTS}
 

@@ -1,26 +1,34 @@
 """What the models of all tables of problem files have in common.
 
-A table is a class: its fields are the keys, each with type, default and sentence. From these come
-the schema, the page of keys, and what is said of a file that is wrong. `build` makes what a table
-stands for.
+A table is a class: its fields are the keys, each with type, unit, default and sentence. From these
+come the schema, the page of keys, and what is said of a file that is wrong. `build` makes what a
+table stands for.
 """
 
-import inspect
 import json
+import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field
-from difflib import get_close_matches
+from functools import cache
 from pathlib import Path as FilePath
-from typing import Any, Self, get_args, get_origin
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, core_schema
 
-from selfmotion.basics import ANGLES, LENGTHS, Array, FileFormatError, SelfmotionError
-from selfmotion.model.path import pose_of
+from selfmotion.basics import TURN, Array, FileFormatError, PathError, SelfmotionError, scaled
+from selfmotion.model.path import ORIENTATIONS, pose_of
 from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3
+from selfmotion.shell.documents.field_types import Checked, Lengths, Numbers, Turns, key
+
+# Ending of a key → the SI unit, and what stands there in its place.
+_SCALES = {"_deg": math.pi / 180.0, "_mm": 1e-3}
+_UNITS = {"_deg": ("rad", "°"), "_mm": ("m", "mm")}
 
 
 class Table(BaseModel):
@@ -31,12 +39,137 @@ class Table(BaseModel):
     @property
     def given(self) -> dict[str, Any]:
         """The keys that are given, with their values."""
-        return {name: getattr(self, name) for name in _in_order(self)}
+        names = (*type(self).model_fields, *(self.model_extra or ()))
+        return {name: getattr(self, name) for name in names if name in self.model_fields_set}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units_to_si(cls, value: Any) -> Any:
+        return in_si(cls, value)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        reference: dict[str, Any] = handler(schema)
+        _add_units(cls, handler.resolve_ref_schema(reference))
+        return reference
 
 
-def _in_order(table: BaseModel) -> Iterator[str]:
-    names = (*type(table).model_fields, *(table.model_extra or ()))
-    return (name for name in names if name in table.model_fields_set)
+def checks(info: FieldInfo) -> Checked | None:
+    """Return what checks the values of a key, where it is a type of ours."""
+    return next((item for item in info.metadata if isinstance(item, Checked)), None)
+
+
+@cache
+def other_units(table: type[BaseModel]) -> dict[str, tuple[str, float]]:
+    """Return the keys of a table in other units: the key in SI units, and how large a unit is."""
+    return {
+        name + ending: (name, _SCALES[ending])
+        for name, info in table.model_fields.items()
+        for ending in getattr(checks(info), "units", ())
+    }
+
+
+def in_si(table: type[BaseModel], value: Any) -> Any:
+    """Return what is written of a table with its keys in SI units; JSON's null is no key.
+
+    Raises
+    ------
+    ValidationError
+        A key is given twice, or holds no numbers; or an angle in radians is more than a turn.
+    """
+    if not isinstance(value, Mapping):
+        return value
+    found: dict[str, Any] = {}
+    for written, item in value.items():
+        name, unit = other_units(table).get(written, (written, None))
+        if item is None:
+            continue
+        if name in found:
+            raise refused(written, item, f"'{name}' is given twice, in two units; keep one")
+        info = table.model_fields.get(name)
+        if unit is not None:
+            try:
+                item = scaled(item, unit)
+            except ValueError as error:
+                raise refused(written, item, str(error)) from error
+        elif info is not None and getattr(checks(info), "within_turn", False):
+            _check_radians(name, item)
+        found[name] = item
+    return found
+
+
+def _check_radians(name: str, value: Any) -> None:
+    """Refuse an angle in radians that can only be meant in degrees."""
+    for item in value if isinstance(value, list) else [value]:
+        if isinstance(item, int | float) and TURN < abs(item) < math.inf:
+            said = f"{item:g} rad is more than a turn; in degrees say {name}_deg"
+            raise refused(name, value, said)
+
+
+def refused(key: str, value: Any, said: str) -> ValidationError:
+    """Return the error of a key of a table."""
+    kind = PydanticCustomError("said", "{said}", {"said": said})
+    error: InitErrorDetails = {"type": kind, "loc": (key,), "input": value}
+    return ValidationError.from_exception_data(key, [error])
+
+
+def _add_units(table: type[BaseModel], schema: dict[str, Any]) -> None:
+    """Add keys in other units to the JSON Schema of a table, in place."""
+    keys = schema["properties"]
+    for node in keys.values():
+        # JSON has no infinity.
+        if isinstance(node.get("default"), float) and math.isinf(node["default"]):
+            del node["default"]
+    for written, (name, unit) in other_units(table).items():
+        node = dict(keys[name])
+        si, other = _UNITS[written.removeprefix(name)]
+        # Of what is in brackets.
+        node["description"] = re.sub(
+            rf"(?<!\w){si}(?!\w)(?=[^\[\]]*\])", other, node["description"]
+        )
+        default = node.get("default")
+        if isinstance(default, int | float) and not isinstance(default, bool):
+            node["default"] = float(f"{default / unit:.12g}")
+        elif default is not None:
+            del node["default"]
+        keys[written] = node
+        # In another unit it will do as well.
+        if name in schema.get("required", ()):
+            schema["required"].remove(name)
+
+
+_OF_THE_AXES = f"of the axes; one of {', '.join([*ORIENTATIONS][:-1])} and {[*ORIENTATIONS][-1]}."
+
+
+class PoseTable(Table):
+    """A pose: a position, and an orientation in one of several ways; or a 4 × 4 matrix."""
+
+    position: Lengths = key("Of the origin [m].")
+    rotation: Numbers = key(f"3 × 3 matrix {_OF_THE_AXES}")
+    quaternion: Numbers = key(f"w, x, y, z {_OF_THE_AXES}")
+    rpy: Turns = key(f"Roll, pitch and yaw [rad] {_OF_THE_AXES}")
+    rotation_vector: Turns = key(f"Axis times angle [rad] {_OF_THE_AXES}")
+    normal: Numbers = key("Direction of the z axis, instead of an orientation.")
+
+
+class _Posed:
+    """Makes a type of poses: a table of a position and an orientation, or a matrix."""
+
+    def __get_pydantic_core_schema__(self, _source: Any, handler: Any) -> CoreSchema:
+        matrix = Annotated[list[Any], Field(min_length=4, max_length=4)]
+        written = handler.generate_schema(matrix | PoseTable)
+        return core_schema.no_info_plain_validator_function(pose, json_schema_input_schema=written)
+
+
+def pose(value: Any) -> SE3:
+    """Return the pose that a file writes; ValueError for what is none."""
+    try:
+        return pose_of(in_si(PoseTable, value))
+    except PathError as error:
+        raise ValueError(str(error)) from error
+
+
+Pose = Annotated[SE3, _Posed()]
 
 
 @dataclass(eq=False)
@@ -126,108 +259,3 @@ def _described(value: Any) -> Any:
     if isinstance(value, Table):
         return value.given
     return str(value) if isinstance(value, FilePath) else value.homogeneous.tolist()
-
-
-class OneOf:
-    """Makes a type of several tables that are told apart by a key, and of the user's own classes.
-
-    Parameters
-    ----------
-    tag : str
-        The key that says which it is.
-    tables : callable
-        () → the tables, each with its value of that key.
-    own : type of Table
-        What reads the table of a class of the user's own.
-    classes : callable
-        () → all classes that are known by now, by the value of that key.
-    besides : sequence of str
-        Keys of such a table that are not among the parameters of its class.
-    """
-
-    def __init__(
-        self,
-        tag: str,
-        tables: Callable[[], Sequence[type[Table]]],
-        own: type[Table],
-        classes: Callable[[], Mapping[str, type]],
-        besides: Sequence[str] = (),
-    ) -> None:
-        self._tag, self._tables, self._own = tag, tables, own
-        self._classes, self._besides = classes, besides
-
-    def __get_pydantic_core_schema__(self, _source: Any, handler: Any) -> CoreSchema:
-        several = {name: handler.generate_schema(item) for name, item in self.by_name().items()}
-        union = core_schema.tagged_union_schema(several, self._tag)
-        return core_schema.no_info_wrap_validator_function(self._read, union)
-
-    def by_name(self) -> dict[str, type[Table]]:
-        """Return the tables by the value of the key that tells them apart."""
-        return {
-            get_args(item.model_fields[self._tag].annotation)[0]: item for item in self._tables()
-        }
-
-    def _read(self, value: Any, refuse: Callable[[Any], Any]) -> Any:
-        name = value.get(self._tag) if isinstance(value, Mapping) else None
-        if isinstance(name, str):
-            # Chosen here, so that errors are told without the kind in the way to a key.
-            if name in (known := self.by_name()):
-                return known[name].model_validate(value)
-            if name in (classes := self._classes()):
-                return self._read_own(classes[name], value)
-        return refuse(value)
-
-    def _read_own(self, cls: type, value: Mapping[str, Any]) -> Table:
-        """Return the table of a class of the user's own, by the signature of that."""
-        context = getattr(cls, "context", ())
-        items = [x for x in inspect.signature(cls).parameters.values() if x.name not in context]
-        known = [self._tag, *self._besides, *(item.name for item in items)]
-        is_open = any(item.kind is item.VAR_KEYWORD for item in items)
-        wrong = [
-            unknown_key(name, known, value) for name in value if not (is_open or name in known)
-        ]
-        if wrong:
-            raise ValidationError.from_exception_data(cls.__name__, wrong)
-        poses = [item.name for item in items if "SE3" in str(item.annotation)]
-        return self._own.model_validate(
-            {name: pose_of(item) if name in poses else item for name, item in value.items()}
-        )
-
-
-class Either:
-    """Makes a type of values that are told apart by what they are: a switch, a list or a table."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        types = {_form(item): item for item in get_args(source)}
-
-        def read(value: Any, _refuse: Callable[[Any], Any]) -> Any:
-            kind = types.get(type(value), types[dict])
-            return TypeAdapter(kind).validate_python(value)
-
-        return core_schema.no_info_wrap_validator_function(read, handler(source))
-
-
-def _form(kind: Any) -> type:
-    return next((form for form in (bool, list) if form in (kind, get_origin(kind))), dict)
-
-
-def unknown_key(key: str, known: Sequence[str], table: Mapping[str, Any]) -> InitErrorDetails:
-    """Return the error of a key that a table does not know."""
-    said = f"unknown key{nearest_key(key, known)}"
-    kind = PydanticCustomError("unknown_key", "{said}", {"said": said})
-    return {"type": kind, "loc": (key,), "input": table[key]}
-
-
-# Endings of keys in other units, and the keys that may have them.
-UNITS = {"_deg": ANGLES, "_mm": LENGTHS}
-
-
-def nearest_key(key: str, known: Sequence[str], unit: str = "") -> str:
-    """Return what to say of an unknown key, which was written with a unit's ending."""
-    units = [name + suffix for suffix, names in UNITS.items() for name in known if name in names]
-    near = get_close_matches(key, [*known, *units], 1)
-    if unit:
-        # What has the same unit is what is meant.
-        likely = [name for name in known if name in UNITS[unit]]
-        near = [f"{name}{unit}" for name in get_close_matches(key, likely, 1)] or near
-    return f", did you mean '{near[0]}'?" if near else f", expected one of: {', '.join(known)}"
