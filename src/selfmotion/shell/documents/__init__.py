@@ -25,11 +25,9 @@ from selfmotion.shell.documents.overrides import (
 )
 from selfmotion.shell.documents.problem_file import (
     plan_request_of as plan_request_of,
+    problem_document as problem_document,
     read_job as read_job,
     read_problem as read_problem,
-)
-from selfmotion.shell.documents.problem_writing import (
-    problem_document as problem_document,
     write_problem as write_problem,
 )
 from selfmotion.shell.documents.seam_job import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, ValidationError
+from pydantic import AfterValidator, ValidationError
 
 from selfmotion.basics import FileFormatError, ProblemError
 from selfmotion.model.collision import Obstacle, obstacle_from_dict, obstacle_shapes
@@ -54,10 +54,8 @@ class BodyTable(PoseTable, Table):
         return obstacle_from_dict({**values, "position": position, "rotation": rotation})
 
 
-class OwnBody(BodyTable):
+class OwnBody(BodyTable, extra="allow"):
     """A body of a shape of the user's own."""
-
-    model_config = ConfigDict(extra="allow")
 
 
 class BoxTable(BodyTable):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, model_validator
+from pydantic import model_validator
 
 from selfmotion.basics import restore
 from selfmotion.model.collision import Obstacle, disabled_links, srdf_notes
@@ -47,10 +47,8 @@ class ConstraintTable(Table):
         return constraint
 
 
-class OwnConstraint(ConstraintTable):
+class OwnConstraint(ConstraintTable, extra="allow"):
     """A constraint of a class of the user's own."""
-
-    model_config = ConfigDict(extra="allow")
 
 
 class BandConstraint(ConstraintTable):

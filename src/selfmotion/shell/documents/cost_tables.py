@@ -3,8 +3,6 @@
 import math
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict
-
 from selfmotion.basics import restore
 from selfmotion.model.motion import NullMotion
 from selfmotion.problem.costs import Cost, FunctionCost, Scaled
@@ -39,10 +37,8 @@ class CostTable(Table):
         return cost
 
 
-class OwnCost(CostTable):
+class OwnCost(CostTable, extra="allow"):
     """A cost of a class of the user's own."""
-
-    model_config = ConfigDict(extra="allow")
 
 
 class NamedCost(CostTable):
@@ -232,10 +228,8 @@ class NullMotionTable(Table):
         return found
 
 
-class OwnNullMotion(NullMotionTable):
+class OwnNullMotion(NullMotionTable, extra="allow"):
     """A null motion of a class of the user's own."""
-
-    model_config = ConfigDict(extra="allow")
 
 
 class BSplineTable(NullMotionTable):

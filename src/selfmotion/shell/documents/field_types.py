@@ -57,7 +57,7 @@ class Checked:
         return dict(self.schema)
 
 
-def _of_kind(kind: type | tuple[type, ...], what: str) -> Callable[[Any], Any]:
+def of_kind(kind: type | tuple[type, ...], what: str) -> Callable[[Any], Any]:
     """Return a function that refuses what is not of a kind, and says what was expected."""
 
     def check(value: Any) -> Any:
@@ -132,7 +132,7 @@ def _start(value: Any) -> Any:
 _NUMBER = {"type": "number"}
 _TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
 _STRINGS = {"type": "array", "items": {"type": "string"}}
-_ONE = (_of_kind((int, float), "a number"), _NUMBER)
+_ONE = (of_kind((int, float), "a number"), _NUMBER)
 _SOME = (_numbers, {"anyOf": [_NUMBER, {"type": "array"}]})
 _LISTED = (_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})
 _START = {"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}
@@ -154,11 +154,11 @@ Coordinates = Annotated[
 ]
 Start = Annotated[Any, Checked(_start, _START, ("_deg",), per_joint=True)]
 Axis = Annotated[Any, Checked(_axis, {"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})]
-Whole = Annotated[int, Checked(_of_kind(int, "a whole number"), {"type": "integer"})]
-Flag = Annotated[bool, Checked(_of_kind(bool, "true or false"), {"type": "boolean"})]
-Text = Annotated[str, Checked(_of_kind(str, "a text"), {"type": "string"})]
-File = Annotated[str, Checked(_of_kind(str, "the name of a file"), {"type": "string"})]
+Whole = Annotated[int, Checked(of_kind(int, "a whole number"), {"type": "integer"})]
+Flag = Annotated[bool, Checked(of_kind(bool, "true or false"), {"type": "boolean"})]
+Text = Annotated[str, Checked(of_kind(str, "a text"), {"type": "string"})]
+File = Annotated[str, Checked(of_kind(str, "the name of a file"), {"type": "string"})]
 Files = Annotated[list[str], Checked(*_LISTED)]
 Names = Annotated[list[str], Checked(*_LISTED)]
 SeveralNames = Annotated[list[str], Checked(_several_names, _STRINGS)]
-AnyTable = Annotated[dict[str, Any], Checked(_of_kind(Mapping, "a table"), {"type": "object"})]
+AnyTable = Annotated[dict[str, Any], Checked(of_kind(Mapping, "a table"), {"type": "object"})]

@@ -26,6 +26,7 @@ from selfmotion.shell.documents.field_types import (
     Whole,
     key,
     needed,
+    of_kind,
 )
 from selfmotion.shell.documents.one_of import Either
 from selfmotion.shell.documents.path_tables import Events, FilePoses, ToolMotion, after
@@ -42,23 +43,12 @@ _SLOW = 0.01
 
 
 def _feed(value: Any) -> Any:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number and value != HIGHEST:
-        raise ValueError(f"is {value!r}, expected a number, or '{HIGHEST}'")
-    return value
+    return value if value == HIGHEST else of_kind((int, float), f"a number, or '{HIGHEST}'")(value)
 
 
-def _listed(value: Any) -> Any:
-    if not isinstance(value, list):
-        raise ValueError(f"is {value!r}, expected a list")
-    return value
-
-
-_Events = Annotated[
-    list[Any],
-    Checked(_listed, {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}),
-]
+_PAIRS = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
 _FEED = {"anyOf": [{"type": "number"}, {"const": HIGHEST}]}
+_Events = Annotated[list[Any], Checked(of_kind(list, "a list"), _PAIRS)]
 _Feed = Annotated[Any, Checked(_feed, _FEED, ("_mm",))]
 
 
@@ -215,9 +205,10 @@ class JobTable(Table):
     def build(self, context: Context, task: Task) -> dict[str, Any]:
         """Return the settings of `plan_job`."""
         values = self.given
-        for name in {"start", "end"} & set(values):
-            with context.naming(f"job: {name}"):
-                values[name] = start_of(values[name], context.robot, task)
+        for name in ("start", "end"):
+            if name in values:
+                with context.naming(f"job: {name}"):
+                    values[name] = start_of(values[name], context.robot, task)
         return values
 
 

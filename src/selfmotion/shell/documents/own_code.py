@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, Saved, public_name
+from selfmotion.basics import FileFormatError, ProblemError, Saved, public_name
 from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import NullMotion
 from selfmotion.model.path import Path
@@ -86,3 +86,22 @@ def _imported(name: str, where: str, folder: FilePath, allowed: bool) -> Any:
             f"{where}: '{name}' cannot be imported: {error}; expected module:attribute, the module "
             f"in {folder} or installed"
         ) from error
+
+
+def described(value: Saved) -> dict[str, Any]:
+    """Return the description of a value, its class named by module where it is the user's own."""
+    table, cls = value.to_dict(), type(value)
+    if table["kind"] != cls.kind:
+        family = next(base for base in cls.__mro__ if Saved in base.__bases__)
+        raise ProblemError(
+            f"{cls.__name__} '{getattr(value, 'name', '')}' holds a function, which a file cannot "
+            f"carry; derive a class from {public_name(family)}"
+        )
+    if not cls.__module__.startswith("selfmotion."):
+        if cls.__module__ == "__main__":
+            raise FileFormatError(
+                f"{cls.__name__} is defined in the script that runs; move it into a module, which "
+                f"a file can name"
+            )
+        table["kind"] = f"{cls.__module__}:{cls.__qualname__}"
+    return table

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import ConfigDict
 from typing_extensions import TypeAliasType
 
 from selfmotion.basics import ProblemError, is_file, restore
@@ -174,10 +173,8 @@ def _built(value: Any, context: Context) -> Any:
     return value.build(context) if isinstance(value, PathTable) else value
 
 
-class OwnPath(PathTable):
+class OwnPath(PathTable, extra="allow"):
     """A tool motion of a class of the user's own."""
-
-    model_config = ConfigDict(extra="allow")
 
     path: ToolMotion = key("Another tool motion.")
     pieces: list[ToolMotion] = key("Other tool motions.")

@@ -1,4 +1,4 @@
-"""From a problem file to a problem, and how to plan it."""
+"""From a problem file to a problem, and how to plan it; and back."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from selfmotion.basics import (
     ProblemError,
     as_path,
     read_document,
+    write_document,
 )
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, check_problem
+from selfmotion.shell.documents.named_files import named_from
 
 if TYPE_CHECKING:
     from selfmotion.shell.documents.job_tables import JobFile
@@ -104,3 +106,38 @@ def built(
         context.functions = import_own(raw, context.beside(""), allow_code)
         table = checked(model, raw)
     return table.build(context)
+
+
+def write_problem(problem: Problem | PlanRequest, file: str | FilePath) -> None:
+    """Write a problem as TOML or JSON that `read_problem` turns into the same problem.
+
+    Of a `PlanRequest` the settings of the search, its goal and outputs are written as well:
+    `read_job` turns the file into the same one.
+
+    Raises
+    ------
+    ProblemError
+        It holds a function, which a file cannot carry, or an arm that is in no URDF file; or a
+        search begins with a generator of random numbers, or with an optimiser of one's own.
+    FileFormatError
+        The file cannot be written.
+    """
+    path = as_path(file)
+    table = problem_document(problem, path)
+    if isinstance(problem, PlanRequest):
+        # Plain keys stand before the first table.
+        table = dict(sorted(table.items(), key=lambda item: isinstance(item[1], dict)))
+    write_document(path, table)
+
+
+def problem_document(problem: Problem | PlanRequest, file: FilePath) -> dict[str, Any]:
+    """Return what a problem file says of a problem; ProblemError as for `write_problem`."""
+    from selfmotion.shell.documents.problem_table import ProblemTable
+
+    if not isinstance(problem, PlanRequest):
+        check_problem(problem)
+        problem = PlanRequest(problem)
+    # Files are named from where the new one is.
+    table = ProblemTable.of(problem)
+    named: dict[str, Any] = named_from(table, FilePath.cwd(), file.parent.resolve())
+    return named

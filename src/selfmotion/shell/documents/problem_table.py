@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated, Any, Literal
+
+import numpy as np
 
 from selfmotion.basics import ProblemError
 from selfmotion.certificate import Tolerance
@@ -20,7 +22,7 @@ from selfmotion.problem.constraints import (
     Constraint,
     separate_clearances,
 )
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.problem import Problem, problem_to_dict
 from selfmotion.shell.documents.body_tables import WorkpieceTable
 from selfmotion.shell.documents.constraint_tables import (
     AnyConstraint,
@@ -47,6 +49,7 @@ from selfmotion.shell.documents.field_types import (
 )
 from selfmotion.shell.documents.joint_limits import joint_limit_notes, read_joint_limits
 from selfmotion.shell.documents.one_of import Either
+from selfmotion.shell.documents.own_code import described
 from selfmotion.shell.documents.path_tables import ToolMotion
 from selfmotion.shell.documents.robot_tables import RobotTable
 from selfmotion.shell.documents.tables import Context, Pose, Table
@@ -389,6 +392,55 @@ class ProblemTable(SharedTable):
                     option = "optimizer" if name == "optimiser" else name
                     found[option] = self.given[name].build(context)
         return found
+
+    @classmethod
+    def of(cls, request: PlanRequest) -> dict[str, Any]:
+        """Return what a file says of a problem, and of how it is planned.
+
+        Raises
+        ------
+        ProblemError
+            It holds what a file cannot carry.
+        """
+        search, optimizer = request.search, request.optimizer
+        if search is not None and not isinstance(search.rng, int):
+            raise ProblemError(
+                "search: rng is a generator, which a file cannot carry; give a number"
+            )
+        if not isinstance(optimizer, QuasiNewton | None):
+            raise ProblemError(
+                f"optimizer: {type(optimizer).__name__} is no QuasiNewton, which a file can carry"
+            )
+        settings: dict[str, Any] = {
+            "goal": None if request.goal == "best" else request.goal,
+            "outputs": [str(name) for name in request.outputs] or None,
+            "max_evaluations": request.max_evaluations,
+            "parts": {key: _plain(value) for key, value in (request.parts or {}).items()} or None,
+            "keep": {key: float(factor) for key, factor in (request.keep or {}).items()} or None,
+        }
+        tables = {"search": search, "tolerance": request.tolerance, "optimiser": optimizer}
+        for name, value in tables.items():
+            settings[name] = None if value is None else asdict(value)
+        table = problem_to_dict(request.problem, RobotTable.of, described)
+        if "collision" in table:
+            # Plans' files have the name that it had when their format was made.
+            table["clearance"] = table.pop("collision")
+        apart = table.get("clearance")
+        for item in apart if isinstance(apart, list) else [apart]:
+            if isinstance(item, dict):
+                del item["kind"]
+        found: dict[str, Any] = _without_none({**settings, **table})
+        return found
+
+
+def _plain(value: Any) -> Any:
+    return np.asarray(value).tolist()
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value
 
 
 def start_of(setting: Any, robot: RobotModel, task: Task) -> Any:

@@ -79,16 +79,10 @@ class RobotPartTable(SourceTable):
     @classmethod
     def of(cls, part: UrdfPart) -> dict[str, Any]:
         """Return what a file says of a part of a cell."""
-        is_known = part.source in _KNOWN
+        is_known, base = part.source in _KNOWN, part.base
         source = part.source if is_known else str(FilePath(part.source).resolve())
-        base = (
-            None
-            if part.base is None
-            else {
-                "position": part.base.translation.tolist(),
-                "rotation": part.base.rotation.tolist(),
-            }
-        )
+        if base is not None:
+            base = {"position": base.translation.tolist(), "rotation": base.rotation.tolist()}
         table = {
             "name" if is_known else "file": source,
             "base": base,
