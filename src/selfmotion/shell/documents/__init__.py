@@ -28,13 +28,11 @@ from selfmotion.shell.documents.problem_file import (
     problem_document as problem_document,
     read_job as read_job,
     read_problem as read_problem,
-    write_problem as write_problem,
-)
-from selfmotion.shell.documents.seam_job import (
-    SeamJob as SeamJob,
     read_seam_job as read_seam_job,
     seam_job_of as seam_job_of,
+    write_problem as write_problem,
 )
+from selfmotion.shell.documents.seam_job import SeamJob as SeamJob
 
 
 def json_schema() -> dict[str, Any]:
