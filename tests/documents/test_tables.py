@@ -1,8 +1,10 @@
 """The models of files say what the classes are made of: every kind, every key, every default."""
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ from selfmotion.shell.documents.constraint_tables import (
 from selfmotion.shell.documents.cost_tables import COSTS, NULL_MOTIONS, AnyCost
 from selfmotion.shell.documents.job_tables import JobTable, SeamTable
 from selfmotion.shell.documents.one_of import OneOf
-from selfmotion.shell.documents.path_tables import PATHS, LeadsTable, WeaveTable
+from selfmotion.shell.documents.path_tables import PATHS, FilePoses, LeadsTable, WeaveTable
 from selfmotion.shell.documents.problem_table import (
     FollowTable,
     InPartsTable,
@@ -34,6 +36,7 @@ from selfmotion.shell.documents.problem_table import (
 )
 from selfmotion.shell.documents.tables import Table
 
+SHELL = Path(sm.__file__).parent / "shell"
 POSE = {"position", "rotation", "quaternion", "rpy", "rotation_vector", "normal"}
 PACED = {"feed", "turn_rate", "acceleration", "turn_acceleration", "smoothing", "within", "weave"}
 FRAMED = {"frame", "leads"}
@@ -131,6 +134,16 @@ def test_defaults_are_those_of_python(name: str) -> None:
 def test_an_exception_is_of_a_key_that_there_is() -> None:
     for name, key in DEFAULTS:
         assert key in {**KINDS, **OTHERS}[name][0].model_fields
+
+
+def test_a_key_is_written_in_one_file_of_the_shell() -> None:
+    """Beside the notice of options that became keys: by keys whose names are no other words."""
+    keys = [key for key in FilePoses.__annotations__ if "_" in key]
+    assert {"flip_normals", "rotary_axes"} <= set(keys)
+    texts = {file.name: file.read_text("utf-8") for file in SHELL.rglob("*.py")}
+    for key in keys:
+        named = {name for name, text in texts.items() if re.search(rf"\b{key}\b", text)}
+        assert named - {"moved.py"} == {"path_tables.py"}, key
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from functools import cache
 from typing import Any, get_args, get_origin
 
 from pydantic import TypeAdapter
@@ -106,9 +107,14 @@ class Either:
 
         def read(value: Any, _refuse: Callable[[Any], Any]) -> Any:
             kind = types.get(type(value), types[dict])
-            return TypeAdapter(kind).validate_python(value)
+            return _adapter(kind).validate_python(value)
 
         return core_schema.no_info_wrap_validator_function(read, handler(source))
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
 
 
 def _form(kind: Any) -> type:

@@ -34,7 +34,8 @@ _UNITS = {"_deg": ("rad", "°"), "_mm": ("m", "mm")}
 class Table(BaseModel):
     """A table of a document. A key that is not given is its default, or None."""
 
-    model_config = ConfigDict(extra="forbid", protected_namespaces=())
+    # Built when they are first read: no file has all of them.
+    model_config = ConfigDict(extra="forbid", protected_namespaces=(), defer_build=True)
 
     @property
     def given(self) -> dict[str, Any]:
