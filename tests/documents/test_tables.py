@@ -146,6 +146,13 @@ def test_a_key_is_written_in_one_file_of_the_shell() -> None:
         assert named - {"moved.py"} == {"path_tables.py"}, key
 
 
+def test_kinds_that_are_made_while_it_is_planned_are_in_no_file() -> None:
+    for kind in sorted(IN_NO_FILE - {"Round"}):
+        with pytest.raises(ValidationError) as refused:
+            TypeAdapter(AnyCost).validate_python({"kind": kind})
+        assert [error["type"] for error in refused.value.errors()] == ["union_tag_invalid"]
+
+
 @dataclass(frozen=True)
 class CostOfATest(sm.costs.Cost):
     """A cost of a user's own."""

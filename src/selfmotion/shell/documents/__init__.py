@@ -1,4 +1,9 @@
-"""Problem files and job files: what they may say, read and written."""
+"""Problem files and job files: what they may say, read and written.
+
+The format, table by table: `problem_table` is a whole problem file and `job_tables` a job file;
+`robot_tables`, `path_tables`, `cost_tables`, `constraint_tables` and `body_tables` are what these
+are made of. What a table is, `tables` says. They are imported when a file is read.
+"""
 
 from collections.abc import Mapping
 from typing import Any
