@@ -204,10 +204,10 @@ class ClearanceTable(Table):
     srdf: File = key("File whose `disable_collisions` are left out as well.")
 
     def build(
-        self, context: Context, bodies: Sequence[Obstacle] = (), usual: float = 5e-3
+        self, context: Context, bodies: Sequence[Obstacle] = (), usual: float | None = None
     ) -> Clearance:
         """Return the clearance, which looks at further bodies; a distance not given is `usual`."""
-        distance = self.given.get("distance", usual)
+        distance = self.distance if usual is None or "distance" in self.given else usual
         obstacles = [body.build(context) for body in self.obstacles]
         disabled: list[Any] = [*self.disabled]
         if self.srdf is not None:
