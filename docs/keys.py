@@ -11,9 +11,6 @@ Problem files and job files are TOML, JSON or YAML. Units are SI; a key that is 
 `_deg`, and one that is a length or a speed in `_mm` (`radius_mm = 150`). Keys in **bold** are
 required. `selfmotion schema` writes the same as a JSON Schema, by which editors complete and
 explain keys. [Read and write files](howto/files.md) shows them at work."""
-_POSE = """## A pose { #pose }
-
-A table `{ position = [x, y, z], … }` with one orientation, or a 4 × 4 matrix."""
 # Kinds by the key that holds them, and what the section is called.
 _FAMILIES = (
     ("costs", "Costs"),
@@ -29,7 +26,7 @@ def keys_page() -> str:
     known = schema["$defs"]
     top = {key: value for key, value in schema["properties"].items() if key not in ("grid",)}
     parts = [_INTRO, "## The file { #file }", _table({**schema, "properties": top})]
-    for name, title in (("Robot", "robot"), ("RobotPart", "robot.parts.NAME")):
+    for name, title in (("RobotTable", "robot"), ("RobotPartTable", "robot.parts.NAME")):
         parts += [f"## {title}", _table(known[name])]
     parts += ["## path", "One of these, by its `kind`. A path in a path is one of these, too."]
     parts += _kinds(known, known["ToolMotion"]["discriminator"]["mapping"])
@@ -38,23 +35,22 @@ def keys_page() -> str:
         node = node.get("items", node)
         parts += [f"## {title}: {key}", "One of these, by its `kind`."]
         parts += _kinds(known, node["discriminator"]["mapping"])
-    shapes = known["Workpiece"]["properties"]["obstacles"]["items"]["discriminator"]["mapping"]
+    shapes = known["WorkpieceTable"]["properties"]["obstacles"]["items"]["discriminator"]["mapping"]
     parts += ["## Bodies", "Of obstacles, of the workpiece, and of links, by their `shape`."]
     parts += _kinds(known, shapes)
     for name, title in (
         *(("Relaxation", "relaxations"), ("Workpiece", "workpiece"), ("Follow", "also")),
         *(("Search", "search"), ("Tolerance", "tolerance"), ("InParts", "parts")),
         *(("Damping", "damping"), ("QuasiNewton", "optimiser"), ("LineSearch", "line_search")),
+        ("Loop", "loop"),
     ):
-        parts += [f"## {title}", known[name].get("description", ""), _table(known[name])]
-    listed, table = schema["properties"]["seams"]["anyOf"]
-    parts += ["## seams", "A list, `[[seams]]`, each with:", _table(listed["items"])]
-    parts += ["Or one table, `[seams]`, with a file of all of them:", _table(table)]
-    parts += ["## job", _table(schema["properties"]["job"])]
-    for title in ("leads", "weave"):
-        parts += [f"## {title}", _table(known["line"]["properties"][title])]
-    pose = next(item for item in known["dwell"]["properties"]["at"]["anyOf"] if "title" in item)
-    parts += [_POSE, _table(pose)]
+        table = known[f"{name}Table"]
+        parts += [f"## {title}", table["description"], _table(table)]
+    parts += ["## seams", "A list, `[[seams]]`, each with:", _table(known["SeamTable"])]
+    parts += ["Or one table, `[seams]`, with a file of all of them:", _table(known["SeamsFile"])]
+    for title in ("job", "leads", "weave", "pose"):
+        table = known[f"{title.capitalize()}Table"]
+        parts += [f"## {title} {{ #{title} }}", table["description"], _table(table)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -69,7 +65,7 @@ def _kinds(known: Mapping[str, Any], mapping: Mapping[str, str]) -> Iterator[str
 def _table(node: Mapping[str, Any]) -> str:
     """Return a table of the keys of a table, but for those in other units."""
     keys, required = node["properties"], node.get("required", ())
-    rows = []
+    rows = list[tuple[bool, str]]()
     for key, value in keys.items():
         if key in ("kind", "shape") or (key.endswith(_SUFFIXES) and key.rpartition("_")[0] in keys):
             continue
@@ -79,11 +75,12 @@ def _table(node: Mapping[str, Any]) -> str:
         name = f"**`{key}`**" if is_required else f"`{key}`"
         told = value.get("description", "").replace("|", "\\|")
         others = ", ".join(f"`{unit}`" for unit in units)
-        rows.append(f"| {name} | {_type(value)} | {_default(value)} | {told} | {others} |")
+        row = f"| {name} | {_type(value)} | {_default(value)} | {told} | {others} |"
+        rows.append((not is_required, row))
     if not rows:
         return "No keys of its own."
     head = "| key | value | default | what | also as |\n| --- | --- | --- | --- | --- |"
-    return "\n".join([head, *rows])
+    return "\n".join([head, *(row for _, row in sorted(rows, key=lambda item: item[0]))])
 
 
 def _default(node: Mapping[str, Any]) -> str:
@@ -111,25 +108,30 @@ def _type(node: Mapping[str, Any]) -> str:
             inner = _type(node["items"]) if "items" in node else ""
             return f"list of {inner}" if inner else "list"
         case "object":
-            return _link(node["title"]) if node.get("title") in _SECTIONS else "table"
+            return "table"
         case None:
             return ""
         case name:
             return {"boolean": "true or false", "string": "text"}.get(name, str(name))
 
 
-# Sections of tables by their titles.
+# Sections of tables by the names of their models.
 _SECTIONS = {
-    **{"Pose": "pose", "Robot": "robot", "RobotPart": "robotpartsname", "ToolMotion": "path"},
-    **{"Relaxation": "relaxations", "Workpiece": "workpiece", "Follow": "also"},
-    **{"Search": "search", "Tolerance": "tolerance", "InParts": "parts", "Damping": "damping"},
-    **{"QuasiNewton": "optimiser", "LineSearch": "line_search", "Leads": "leads"},
-    **{"Weave": "weave", "Seam": "seams", "Job": "job"},
+    **{"RobotTable": "robot", "RobotPartTable": "robotpartsname", "ToolMotion": "path"},
+    **{"RelaxationTable": "relaxations", "FollowTable": "also", "InPartsTable": "parts"},
+    **{"QuasiNewtonTable": "optimiser", "LineSearchTable": "line_search", "SeamTable": "seams"},
+    **{
+        f"{name.capitalize()}Table": name
+        for name in (
+            *("pose", "workpiece", "search", "tolerance", "damping", "loop", "leads", "weave"),
+            *("job",),
+        )
+    },
 }
 
 
-def _link(title: str) -> str:
-    section = _SECTIONS.get(title)
+def _link(name: str) -> str:
+    section = _SECTIONS.get(name)
     if section is None:
         return "table"
     return f"[{section.replace('robotpartsname', 'part')}](#{section})"

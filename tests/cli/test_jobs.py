@@ -102,7 +102,9 @@ def test_anything_of_a_job_file_can_be_set(table) -> None:
     assert seams.seams[0].path.feeds[0].asked == 0.04
     assert seams.settings["branches"] == 2
     assert "feeds are in m/s, not mm/s" in complaint("job", table, "--set", "seams.feed=40")
-    assert "unknown key 'brunches'" in complaint("job", table, "--set", "job.brunches=2")
+    assert "job.brunches: unknown key, did you mean 'branches'?" in complaint(
+        "job", table, "--set", "job.brunches=2"
+    )
     assert "expected KEY=VALUE" in complaint("job", table, "--set", "job.branches")
 
 
@@ -142,16 +144,25 @@ def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
     ("text", "said"),
     [
         ("", "expected seams"),
-        ("[[seams]]\nname = 'a'", "seams, 'a': path is missing"),
-        (LISTED.replace("after =", "aftr ="), "unknown key 'aftr'; nearest: 'after'"),
+        ("[[seams]]\nname = 'a'", "seams, 'a': path: is missing"),
+        (LISTED.replace("after =", "aftr ="), "aftr: unknown key, did you mean 'after'?"),
         (LISTED.replace('"there"]', '"nobody"]'), "no other seam"),
-        (LISTED.replace("task =", "tusk ="), "unknown key 'tusk'; nearest: 'task'"),
+        (LISTED.replace("task =", "tusk ="), "tusk: unknown key, did you mean 'task'?"),
         (LISTED.replace("0.1, 0.3]", "0.1]"), "seams, 'there'"),
-        ("[seams]\nfeed = 0.1", "file is missing"),
-        ("[seams]\nfile = 3", "seams: file is 3, expected the name of a file"),
-        ("[seams]\nfile = 'seams.csv'\nfeed = 0.1\nweave = 3", "weave is 3, expected a table"),
-        ("[seams]\nfile = 'seams.csv'\nfeed = 0.1\nevents = 3", "events is 3, expected a list"),
-        ("[seams]\nfile = 'seams.csv'\nfeed = 0.1\nleaves = ['a']", "expected tables of bodies"),
+        ("[seams]\nfeed = 0.1", "seams.file: is missing"),
+        ("[seams]\nfile = 3", "seams.file: is 3, expected the name of a file"),
+        (
+            "[seams]\nfile = 'seams.csv'\nfeed = 0.1\nweave = 3",
+            "weave: is 3, expected a table",
+        ),
+        (
+            "[seams]\nfile = 'seams.csv'\nfeed = 0.1\nevents = 3",
+            "events: is 3, expected a list",
+        ),
+        (
+            "[seams]\nfile = 'seams.csv'\nfeed = 0.1\nleaves = ['a']",
+            "leaves[0]: is 'a', expected a table",
+        ),
         ("[seams]\nfile = 'none.csv'\nfeed = 0.1", "none.csv: cannot be read"),
         ("[seams]\nfile = 'plain.csv'\nfeed = 0.1", "has no column 'seam'"),
         ("[seams]\nfile = 'seams.csv'", "seams.csv: has no times"),

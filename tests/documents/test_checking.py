@@ -1,6 +1,5 @@
 """What is wrong with a problem file is said in one line, with file, key and what was expected."""
 
-import inspect
 import re
 from collections.abc import Iterator
 from copy import deepcopy
@@ -11,10 +10,14 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import ANGLES, LENGTHS, in_si, read_document
-from selfmotion.model.robot import Coordinate
+from selfmotion.basics import read_document
 from selfmotion.shell.documents import plan_request_of
+from selfmotion.shell.documents.body_tables import BODIES
+from selfmotion.shell.documents.constraint_tables import CONSTRAINTS
+from selfmotion.shell.documents.cost_tables import COSTS
+from selfmotion.shell.documents.path_tables import PATHS
 from selfmotion.shell.documents.schema import json_schema
+from selfmotion.shell.documents.tables import checks
 from support.cells import CELL, written
 from support.shell import complaint
 
@@ -46,12 +49,12 @@ MALFORMED = [
     ('kind = "circle"', "", "path: has no key 'kind', which says what it is"),
     ("radius_mm = 100", "radius_mm = 0", "path: circle: radius is 0.0, expected a number > 0"),
     ("radius_mm = 100", "radius_deg = 100", "path.radius_deg: 'radius' is no angle"),
-    ("radius_mm = 100", "radus_mm = 100", "path.radus_mm: unknown key; nearest: 'radius_mm'"),
+    ("radius_mm = 100", "radus_mm = 100", "path.radus_mm: unknown key, did you mean 'radius_mm'"),
     ("duration = 4", "feed = 0.1\nwithin_deg = 2", "path.within_deg: 'within' is no angle"),
     ("band_deg = 5", "band_mm = 5", "relaxations[0].band_mm: row 'rx' is an angle; say band_deg"),
     ('["rx", "ry"]', '["x", "y"]', "relaxations[0].band_deg: row 'x' is a length; say band_mm"),
-    ("duration = 4", "feeed_mm = 4", "path.feeed_mm: unknown key; nearest: 'feed_mm'"),
-    ("= 50\n", "= 50\ntolerance_mm = { position = 1 }\n", "tolerance_mm: is {'position': 1}"),
+    ("duration = 4", "feeed_mm = 4", "path.feeed_mm: unknown key, did you mean 'feed_mm'?"),
+    ("= 50\n", "= 50\ntolerance_mm = { position = 1 }\n", "'tolerance' is no length: a table"),
     ("= 50\n", "= 50\noptimiser = { tolerance_mm = 1 }\n", "'tolerance' is no length"),
     ('tool = "panda_hand_tcp"', "base = { rpy=[0,0,180] }", "180 rad is more than a turn; in degr"),
     ("band_deg = 5", "band = 5e1", "relaxations[0]: relaxation (rx, ry): a band of 50 rad is more"),
@@ -83,22 +86,20 @@ MALFORMED = [
 ]  # fmt: skip
 
 
-KINDS = {
-    f"{family.__name__}-{name}": kind
-    for family in (sm.constraints.Constraint, sm.costs.Cost, Coordinate)
-    for name, kind in family.kinds().items()
-}
+TABLES = {**CONSTRAINTS.by_name(), **COSTS.by_name(), **PATHS.by_name(), **BODIES.by_name()}
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", TABLES)
 def test_what_is_an_angle_or_a_length_may_be_in_degrees_or_millimetres(name: str) -> None:
-    """By what the docstring says of each parameter that is one number."""
-    text = inspect.getdoc(KINDS[name]) or ""
-    for block in re.findall(r"^(\w+(?:, \w+)*) : float.*\n((?:    .*\n?)+)", text, re.MULTILINE):
-        units = set(re.findall(r"\[(rad|m|rad or m)\]", block[1]))
-        for parameter in block[0].split(", "):
-            assert parameter in ANGLES or not units & {"rad", "rad or m"}, parameter
-            assert parameter in LENGTHS | {"margin"} or not units & {"m", "rad or m"}, parameter
+    """By what the sentence of each key says, or a rate of it."""
+    for key, info in TABLES[name].model_fields.items():
+        told = re.findall(r"\[([^\[\]]*)\]", info.description or "")
+        units = {unit.partition("/")[0] for text in told for unit in text.split(" or ")}
+        endings = set(getattr(checks(info), "units", ()))
+        if checks(info) is not None:
+            assert ("_deg" in endings) == ("rad" in units), key
+            # Most joints turn: what is of joints is in degrees alone.
+            assert ("_mm" in endings) == ("m" in units) or endings == {"_deg"}, key
 
 
 def test_a_tilt_in_degrees_is_the_one_in_radians(tmp_path: Path) -> None:
@@ -237,12 +238,14 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("kind", ["JointVelocityLimits", "JointTorqueLimits", "ToolLimits"])
-def test_a_margin_that_is_a_share_has_no_unit(kind: str) -> None:
+def test_a_margin_that_is_a_share_has_no_unit(kind: str, tmp_path: Path) -> None:
     """Half a degree would be taken for a share of 0.0087."""
-    with pytest.raises(sm.errors.FileFormatError, match="is a share here"):
-        in_si({"constraints": [{"kind": kind, "margin_deg": 0.5}]})
-    found = in_si({"constraints": [{"kind": "JointPositionLimits", "margin_deg": 0.5}]})
-    assert found["constraints"][0]["margin"] == pytest.approx(np.radians(0.5))
-    kinds = json_schema()["$defs"]
-    assert "margin_deg" not in kinds[kind]["properties"]
-    assert "margin_deg" in kinds["JointPositionLimits"]["properties"]
+    more = '[[constraints]]\nkind = "{}"\nmargin_deg = 0.5\n'
+    with pytest.raises(sm.errors.FileFormatError, match="'margin' is no angle: Share of"):
+        sm.read_problem(written(tmp_path, CELL + more.format(kind)))
+    found = sm.read_problem(written(tmp_path, CELL + more.format("JointPositionLimits")))
+    assert found.constraints[-1].margin == pytest.approx(np.radians(0.5))
+    tables = CONSTRAINTS.by_name()
+    known = json_schema()["$defs"]
+    assert "margin_deg" not in known[tables[kind].__name__]["properties"]
+    assert "margin_deg" in known[tables["JointPositionLimits"].__name__]["properties"]

@@ -1,6 +1,6 @@
 """Files that documents name: from the document's place, whoever writes it."""
 
-import re
+import inspect
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,10 @@ import trimesh
 
 import selfmotion as sm
 from selfmotion.shell.documents import write_combination
+from selfmotion.shell.documents.field_types import File, Files
 from selfmotion.shell.documents.named_files import FILE_KEYS, named_from
+from selfmotion.shell.documents.problem_table import ProblemTable, SharedTable
+from selfmotion.shell.documents.tables import Table
 from support.arms import PANDA_HOME, robot_named
 
 GRID = """task = "position"
@@ -56,19 +59,16 @@ def test_every_file_is_named_from_where_the_new_document_is(tmp_path: Path) -> N
     assert moved["workpiece"]["on"] == "j"
 
 
-def test_no_key_that_is_looked_for_beside_the_document_is_left_out() -> None:
-    """By the source: what is read beside a document, and its key."""
-    source = Path(sm.__file__).parent / "shell" / "documents"
-    texts = [(source / f"{name}.py").read_text() for name in ("problem_file", "problem_parts")]
-    found = {
-        key
-        for text in texts
-        for call in re.findall(r"beside\((.*?)\)+", text)
-        for key in re.findall(r'\["(\w+)"\]|"(\w+)"', call)
-    }
-    named = {one or other for one, other in found}
-    assert {"file", "joint_limits", "calibration"} <= named
-    assert named <= {*FILE_KEYS, "source"}
+def test_the_keys_that_name_files_are_those_of_the_models() -> None:
+    tables, found = [Table], set[str]()
+    while tables:
+        table = tables.pop()
+        tables += table.__subclasses__()
+        for name, annotation in inspect.get_annotations(table, eval_str=True).items():
+            if annotation in (File, Files):
+                found.add(name)
+    assert found == set(FILE_KEYS)
+    assert ProblemTable in SharedTable.__subclasses__()
 
 
 def test_the_best_of_a_grid_is_of_the_same_measured_arm(tmp_path: Path) -> None:

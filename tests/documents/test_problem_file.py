@@ -449,7 +449,7 @@ def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:
     for wrong in ("pich = 0.1", "amplitude = 0.1"):
         file.write_text(text + f"weave = {{{wrong}}}\n")
         with pytest.raises(
-            sm.errors.FileFormatError, match=r"path: weave\.(pich: unknown|pitch: is missing)"
+            sm.errors.FileFormatError, match=r"path\.weave\.(pich: unknown key|pitch: is missing)"
         ):
             sm.read_problem(file)
 

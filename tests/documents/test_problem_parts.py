@@ -155,7 +155,7 @@ def test_a_shape_needs_its_place_in_the_workpiece(tmp_path: Path) -> None:
     problem(tmp_path, "line", 0.4, 0.0)
     text = (tmp_path / "cell.toml").read_text().replace("start = { position = [0, 0, 0] }", "")
     (tmp_path / "cell.toml").write_text(text)
-    with pytest.raises(sm.errors.FileFormatError, match=r"path\.start is missing"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"path: start is missing"):
         sm.read_problem(tmp_path / "cell.toml")
 
 

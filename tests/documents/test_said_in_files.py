@@ -11,11 +11,16 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.collision import obstacle_shapes
-from selfmotion.shell.documents import json_schema
-from selfmotion.shell.documents.seam_job import JOB, OF_PROBLEM, SEAM
+from selfmotion.shell.documents import constraint_tables, job_tables, problem_table
+from selfmotion.shell.documents.body_tables import BODIES
+from selfmotion.shell.documents.constraint_tables import CONSTRAINTS
+from selfmotion.shell.documents.cost_tables import COSTS, NULL_MOTIONS
+from selfmotion.shell.documents.path_tables import PATHS
+from selfmotion.shell.documents.problem_table import ProblemTable
+from selfmotion.shell.documents.robot_tables import RobotPartTable, RobotTable
+from selfmotion.shell.documents.tables import Table
 from support.arms import robot_named
 
-SCHEMA = json_schema()
 # Parameters that no file has, and why.
 WHILE_IT_RUNS = "is of the run, and an option of the command"
 EXCEPTIONS = {
@@ -60,12 +65,6 @@ OTHERWISE: dict[str, dict[str, str]] = {
 }
 
 
-def keys_of(definition: str) -> set[str]:
-    # Two of a name are told apart by what stands before it.
-    found = [name for name in SCHEMA["$defs"] if definition in name.split("__")]
-    return set.intersection(*(set(SCHEMA["$defs"][name]["properties"]) for name in found))
-
-
 def parameters(thing: Callable[..., Any]) -> set[str]:
     found = inspect.signature(thing).parameters
     context = set(getattr(thing, "context", ()))
@@ -74,40 +73,47 @@ def parameters(thing: Callable[..., Any]) -> set[str]:
 
 def tables() -> list[tuple[str, Callable[..., Any], set[str]]]:
     """Return name, what has the parameters, and the keys that say them."""
-    top = set(SCHEMA["properties"])
-    path_file = keys_of("file")
+    top, paths = keys_of(ProblemTable), PATHS.by_name()
+    circle = keys_of(paths["circle"])
     found: list[tuple[str, Callable[..., Any], set[str]]] = [
         ("Problem", sm.Problem, top),
         ("plan", sm.plan, top),
         ("fastest", sm.fastest, top),
         ("retime", sm.retime, top),
-        ("plan_in_parts", sm.plan_in_parts, top | keys_of("InParts")),
-        ("Search", sm.Search, keys_of("Search")),
-        ("QuasiNewton", sm.QuasiNewton, keys_of("QuasiNewton")),
-        ("Tolerance", sm.Tolerance, keys_of("Tolerance")),
-        ("Damping", sm.Damping, keys_of("Damping")),
-        ("Relaxation", sm.Relaxation, keys_of("Relaxation")),
-        ("Clearance", sm.constraints.Clearance, keys_of("Clearance")),
-        ("Follow", sm.Follow, keys_of("Follow")),
-        ("Feed", sm.paths.Feed, keys_of("feed")),
-        ("feed of a circle", sm.paths.Feed, keys_of("circle") | {"path", "stretches"}),
-        ("Circle.around", sm.paths.Circle.around, keys_of("circle") | {"options"}),
-        ("read_path", sm.files.read_path, path_file),
-        ("load_robot", sm.load_robot, keys_of("Robot") | keys_of("RobotPart")),
-        ("plan_job", sm.plan_job, {*JOB}),
-        ("Seam", sm.Seam, {*SEAM, *OF_PROBLEM}),
+        ("plan_in_parts", sm.plan_in_parts, top | keys_of(problem_table.InPartsTable)),
+        ("Search", sm.Search, keys_of(problem_table.SearchTable)),
+        ("QuasiNewton", sm.QuasiNewton, keys_of(problem_table.QuasiNewtonTable)),
+        ("Tolerance", sm.Tolerance, keys_of(problem_table.ToleranceTable)),
+        ("Damping", sm.Damping, keys_of(constraint_tables.DampingTable)),
+        ("Relaxation", sm.Relaxation, keys_of(constraint_tables.RelaxationTable)),
+        ("Clearance", sm.constraints.Clearance, keys_of(constraint_tables.ClearanceTable)),
+        ("Follow", sm.Follow, keys_of(problem_table.FollowTable)),
+        ("feed of a circle", sm.paths.Feed, circle | {"path", "stretches"}),
+        ("Circle.around", sm.paths.Circle.around, circle | {"options"}),
+        ("read_path", sm.files.read_path, keys_of(paths["file"])),
+        ("load_robot", sm.load_robot, keys_of(RobotTable) | keys_of(RobotPartTable)),
+        ("plan_job", sm.plan_job, keys_of(job_tables.JobTable)),
+        ("Seam", sm.Seam, keys_of(job_tables.SeamTable)),
     ]
-    families = (sm.costs.Cost, sm.constraints.Constraint, sm.motion.NullMotion, sm.paths.Path)
-    for family in families:
-        for kind, cls in family.kinds().items():
-            ours = cls.__module__.startswith("selfmotion.") and kind in SCHEMA["$defs"]
-            if ours and kind != "twist":
-                found.append((kind, cls, keys_of(kind)))
-    for shape, cls in obstacle_shapes():
-        if cls.__module__.startswith("selfmotion."):
-            known = keys_of(shape) | {"pose", "center"}
-            found.append((shape, cls, known))
+    several = (
+        (sm.costs.Cost, COSTS),
+        (sm.constraints.Constraint, CONSTRAINTS),
+        (sm.motion.NullMotion, NULL_MOTIONS),
+        (sm.paths.Path, PATHS),
+    )
+    for family, one_of in several:
+        known = family.kinds()
+        for kind, table in one_of.by_name().items():
+            if kind not in ("twist", "file", "function"):
+                found.append((kind, known[kind], keys_of(table)))
+    shapes = dict(obstacle_shapes())
+    for shape, table in BODIES.by_name().items():
+        found.append((shape, shapes[shape], keys_of(table) | {"pose"}))
     return found
+
+
+def keys_of(table: type[Table]) -> set[str]:
+    return set(table.model_fields)
 
 
 @pytest.mark.parametrize(

@@ -213,12 +213,12 @@ def test_names_of_seams_are_lists(key: str, tmp_path: Path) -> None:
         if is_read:
             sm.files.read_seam_job(file)
         else:
-            with pytest.raises(sm.SelfmotionError, match=f"{key} is .* expected a list of names"):
+            with pytest.raises(sm.SelfmotionError, match=f"{key}: is .* expected a list of names"):
                 sm.files.read_seam_job(file)
 
 
 def test_no_pose_is_offered_in_degrees() -> None:
-    keys = schema()["$defs"]["line"]["properties"]
+    keys = schema()["$defs"]["LinePath"]["properties"]
     assert "start" in keys
     assert "start_deg" not in keys
     assert "start_deg" in schema()["properties"]

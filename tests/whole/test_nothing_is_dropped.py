@@ -18,7 +18,7 @@ from selfmotion.basics import read_document
 from selfmotion.model.task import SE3
 from selfmotion.problem.problem import problem_to_dict
 from selfmotion.shell.documents import json_schema
-from selfmotion.shell.documents.seam_job import SHARED
+from selfmotion.shell.documents.job_tables import JobFile
 from support.arms import PANDA_HOME, robot_named
 from support.places import ROOT
 
@@ -401,7 +401,7 @@ def test_a_job_refuses_the_keys_of_a_problem_that_no_seam_has(tmp_path: Path) ->
     source = ROOT / "examples" / "frame.toml"
     document = tomllib.loads(source.read_text())
     (tmp_path / "seams.csv").write_bytes((ROOT / "examples" / "seams.csv").read_bytes())
-    lost = set(json_schema()["properties"]) - {*SHARED, "job", "seams"}
+    lost = set(json_schema()["properties"]) - set(JobFile.model_fields)
     assert {"damping", "search", "outputs", "tolerance", "path"} <= lost
     for key in lost:
         file = tmp_path / "job.json"

@@ -96,14 +96,11 @@ from selfmotion.basics.jit import (
     seconds_waited_for_kernels as seconds_waited_for_kernels,
 )
 from selfmotion.basics.nested_tables import (
-    ANGLES as ANGLES,
     FORMER_CLEARANCE as FORMER_CLEARANCE,
-    LENGTHS as LENGTHS,
-    PER_JOINT as PER_JOINT,
     in_si as in_si,
-    is_share as is_share,
     read_document as read_document,
     read_values as read_values,
+    scaled as scaled,
     write_document as write_document,
 )
 from selfmotion.basics.progress import Progress as Progress, silent as silent

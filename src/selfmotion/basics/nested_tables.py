@@ -11,39 +11,18 @@ from selfmotion.basics.errors import FileFormatError, nearest
 from selfmotion.basics.files import write_text
 from selfmotion.basics.inputs import TURN, is_number
 
-# Keys with a number for each joint.
-_RATES = ("deceleration", "limit", "offset")
-PER_JOINT = (*_RATES, "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
-# Keys that may end in _deg or _mm: nothing else is an angle or a length, or a rate of one.
-_BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
+# Keys of poses, tolerances and loads that may end in _deg or _mm.
+_ANGLES = frozenset(("rotation", "rotation_vector", "rpy"))
+_LENGTHS = frozenset(("center", "position"))
 # Values above a turn are in degrees.
-_WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
-_TURNS = (*_WITHIN_A_TURN, "lead", "tilt", "margin", "turn_acceleration", "turn_rate", "within")
-ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
-_SIZES = ("length", "lift", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
-_WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
-LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
+_WITHIN_A_TURN = _ANGLES
 # Former name of `clearance`.
 FORMER_CLEARANCE = "collision"
 # Largest depth of nested tables or lists; real files have less than ten.
 _DEEPEST = 50
-_SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
-# Tables of joints with angles.
-_TABLES_OF_NUMBERS = tuple(f"{name}_deg" for name in PER_JOINT)
+_SUFFIXES = {"_deg": (_ANGLES, math.pi / 180.0), "_mm": (_LENGTHS, 1e-3)}
 # Similarity at which an unknown key is taken for a known one.
 _ALIKE = 0.8
-# Rows of relaxations, of position …
-_MOVED = ("x", "y", "z")
-# … and of rotation.
-_TURNED = ("rx", "ry", "rz")
-# Tables whose numbers have no unit.
-_UNITLESS = ("optimiser.",)
-# Keys that are shares there, of a feed.
-_SHARES = ("path.within",)
-# A margin is a share …
-_MARGIN = "margin"
-# … but of limits of position an angle or a length.
-_OF_POSITIONS = "JointPositionLimits"
 
 
 def read_document(file: Path) -> dict[str, Any]:
@@ -185,7 +164,6 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
         angle in radians is more than a turn.
     """
     found: dict[str, Any] = {}
-    _check_rows(table, where)
     for key, value in table.items():
         if value is None:
             continue
@@ -193,46 +171,29 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
         for suffix, (allowed, scale) in _SUFFIXES.items():
             if key.endswith(suffix):
                 name, factor = key.removesuffix(suffix), scale
-                _check_unit(name, suffix, where, allowed, table.get("kind"))
+                _check_unit(name, suffix, where, allowed)
         if name in found:
             raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
         inner = _inner(value, f"{where}{name}")
         if factor is None:
             _check_radians(name, inner, where)
-        found[name] = inner if factor is None else _scaled(inner, factor, f"{where}{key}")
+        try:
+            found[name] = inner if factor is None else scaled(inner, factor)
+        except ValueError as error:
+            raise FileFormatError(f"{where}{key}: {error}") from error
     return found
 
 
-def is_share(key: str, kind: object) -> bool:
-    """Whether a key has no unit in a table of some kind, though it has one in others."""
-    is_margin = key.rpartition(".")[2] == _MARGIN
-    return key.endswith(_SHARES) or (is_margin and kind != _OF_POSITIONS)
-
-
-def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str], kind: object) -> None:
-    """Refuse a key that is none, or has no such unit in a table of some kind."""
-    share = is_share(f"{where}{name}", kind)
-    if name in allowed and not where.startswith(_UNITLESS) and not share:
+def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) -> None:
+    """Refuse a key that is none, or has no such unit."""
+    if name in allowed:
         return
     what = "angle" if suffix == "_deg" else "length"
     near = nearest(name + suffix, [each + suffix for each in allowed], _ALIKE)
-    if near and name not in allowed:
+    if near:
         raise FileFormatError(f"{where}{name}{suffix}: unknown key{near}")
-    known = "" if name in allowed else f", expected one of: {', '.join(sorted(allowed))}"
-    known = ", it is a share here, without a unit" if share else known
-    raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}{known}")
-
-
-def _check_rows(table: Mapping[str, Any], where: str) -> None:
-    """Refuse a band in mm of rows that turn, and one in degrees of rows that do not."""
-    rows = table.get("rows")
-    several = [rows] if isinstance(rows, str) else rows if isinstance(rows, list) else []
-    for row in several:
-        turns = row in _TURNED
-        wrong, right = ("_mm", "_deg") if turns else ("_deg", "_mm")
-        if f"band{wrong}" in table and (turns or row in _MOVED):
-            what = "an angle" if turns else "a length"
-            raise FileFormatError(f"{where}band{wrong}: row '{row}' is {what}; say band{right}")
+    known = ", ".join(sorted(allowed))
+    raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}, expected one of: {known}")
 
 
 def _check_radians(name: str, value: Any, where: str) -> None:
@@ -254,14 +215,21 @@ def _inner(value: Any, where: str) -> Any:
     return value
 
 
-def _scaled(value: Any, factor: float, where: str) -> Any:
+def scaled(value: Any, factor: float) -> Any:
+    """Return a number, or those of lists and tables of numbers, times a factor.
+
+    Raises
+    ------
+    ValueError
+        It is something else; the message says what.
+    """
     if isinstance(value, list):
-        return [_scaled(item, factor, where) for item in value]
-    if isinstance(value, dict) and where.endswith(_TABLES_OF_NUMBERS):
-        return {key: _scaled(item, factor, where) for key, item in value.items()}
+        return [scaled(item, factor) for item in value]
+    if isinstance(value, Mapping):
+        return {key: scaled(item, factor) for key, item in value.items()}
     if not is_number(value):
-        raise FileFormatError(f"{where}: is {value!r}, expected numbers")
+        raise ValueError(f"is {value!r}, expected numbers")
     try:
         return value * factor
     except OverflowError:
-        raise FileFormatError(f"{where}: is {value!r}, expected finite numbers") from None
+        raise ValueError(f"is {value!r}, expected finite numbers") from None

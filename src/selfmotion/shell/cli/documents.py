@@ -12,6 +12,7 @@ from selfmotion.model.path import spread_along
 from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import StageDisplay, plan_with_progress, stages
 from selfmotion.shell.documents import (
+    flipped_normals,
     grid_documents,
     json_schema,
     named_from,
@@ -271,9 +272,10 @@ def _print_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanR
     problem = job.problem
     if _is_in_reach(problem.robot, problem.path, problem.task):
         return
-    other = plan_request_of({**document, "path": _flipped(path)}, file).problem
+    flipped, said = flipped_normals(path)
+    other = plan_request_of({**document, "path": flipped}, file).problem
     if _is_in_reach(other.robot, other.path, other.task):
-        _flip_text("the path", path)
+        _flip_text("the path", said)
 
 
 def _print_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.SeamJob) -> None:
@@ -285,19 +287,14 @@ def _print_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.Sea
         return
     if _is_in_reach(job.robot, first.path, sm.Task(first.task)):
         return
-    turned = [{**seams[0], "path": _flipped(path)}, *seams[1:]] if listed else _flipped(seams)
+    flipped, said = flipped_normals(path if listed else seams)
+    turned = [{**seams[0], "path": flipped}, *seams[1:]] if listed else flipped
     other = seam_job_of({**document, "seams": turned}, file)
     if _is_in_reach(other.robot, other.seams[0].path, sm.Task(first.task)):
-        _flip_text(f"seam '{first.name}'", path)
+        _flip_text(f"seam '{first.name}'", said)
 
 
-def _flipped(table: dict[str, Any]) -> dict[str, Any]:
-    return {**table, "flip_normals": not table.get("flip_normals", False)}
-
-
-def _flip_text(what: str, table: dict[str, Any]) -> None:
-    flips = not table.get("flip_normals", False)
-    said = "with --set path.flip_normals=true" if flips else "without path.flip_normals"
+def _flip_text(what: str, said: str) -> None:
     stages.print(
         f"note: poses of {what} are out of reach as read, and in reach {said}: nx,ny,nz is "
         f"the tool's z axis here, into the part; surface normals of CAD point out of it",

@@ -1,5 +1,11 @@
-"""Problem files and job files: what they may say, read and written."""
+"""Problem files and job files: what they may say, read and written.
 
+The format, table by table: `problem_table` is a whole problem file and `job_tables` a job file;
+`robot_tables`, `path_tables`, `cost_tables`, `constraint_tables` and `body_tables` are what these
+are made of. What a table is, `tables` says. They are imported when a file is read.
+"""
+
+from collections.abc import Mapping
 from typing import Any
 
 from selfmotion.shell.documents.example import (
@@ -14,32 +20,24 @@ from selfmotion.shell.documents.joint_limits import (
 )
 from selfmotion.shell.documents.named_files import named_from as named_from
 from selfmotion.shell.documents.overrides import (
+    belonging as belonging,
     grid_documents as grid_documents,
     keys_of as keys_of,
+    moved_workpiece as moved_workpiece,
     parse_setting as parse_setting,
     set_key as set_key,
     write_combination as write_combination,
 )
 from selfmotion.shell.documents.problem_file import (
     plan_request_of as plan_request_of,
+    problem_document as problem_document,
     read_job as read_job,
     read_problem as read_problem,
-)
-from selfmotion.shell.documents.problem_parts import (
-    belonging as belonging,
-    moved_workpiece as moved_workpiece,
-    obstacle as obstacle,
-    path_of as path_of,
-)
-from selfmotion.shell.documents.problem_writing import (
-    problem_document as problem_document,
-    write_problem as write_problem,
-)
-from selfmotion.shell.documents.seam_job import (
-    SeamJob as SeamJob,
     read_seam_job as read_seam_job,
     seam_job_of as seam_job_of,
+    write_problem as write_problem,
 )
+from selfmotion.shell.documents.seam_job import SeamJob as SeamJob
 
 
 def json_schema() -> dict[str, Any]:
@@ -47,3 +45,10 @@ def json_schema() -> dict[str, Any]:
     from selfmotion.shell.documents import schema
 
     return schema.json_schema()
+
+
+def flipped_normals(table: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """Return a table of a file of poses with its normals the other way, and how to say that."""
+    from selfmotion.shell.documents import path_tables
+
+    return path_tables.flipped_normals(table)

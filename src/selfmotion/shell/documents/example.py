@@ -148,7 +148,6 @@ duration = 4.0         # or feed_mm = 20: one speed from run-up to run-down [mm/
 # kind = "file"        # CSV, ROS Path or PoseArray, NumPy
 # file = "seam.csv"
 # feed = 0.05          # m/s, where the file has no times
-# flip_normals = true  # where nx,ny,nz point out of the part
 # standoff_mm = 5      # held back along the tool's axis
 # ramp = 0.5           # s, in which it is run up from rest, and down again, where it has times
 # frame = {{ position = [0.5, 0, 0.2], rpy_deg = [0, 0, 0] }}  # of the workpiece

@@ -1,21 +1,64 @@
-"""Types of the fields of problem files: what each accepts, says, and tells editors."""
+"""Types of the keys of problem files: what each accepts, says, and tells editors."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import PlainValidator, WithJsonSchema
+from pydantic import Field
+from pydantic_core import CoreSchema, core_schema
 
-from selfmotion.basics import PathError, is_number
-from selfmotion.model.path import ORIENTATIONS, pose_of
+from selfmotion.basics import is_number
 
 # No angle, length, weight or time is beyond this, and its square is a number still.
 _HUGE = 1e15
 
 
-def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -> Any:
-    """Return a type that accepts values of a kind, and says what was expected otherwise."""
+def key(told: str | None = None, default: Any = None) -> Any:
+    """Return a key that may be left out, with the sentence that says what it is.
+
+    That of a table may be the table's own.
+    """
+    return Field(default, description=told)
+
+
+def needed(told: str) -> Any:
+    """Return a key that has to be given, with the sentence that says what it is."""
+    return Field(description=told)
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Makes a type of a function that returns a value or refuses it, and of its JSON Schema.
+
+    Attributes
+    ----------
+    check : callable
+    schema : dict
+    units : tuple of str
+        Endings of the key in other units.
+    per_joint : bool
+        Whether a list of it has a number for each joint.
+    within_turn : bool
+        Whether more than a turn can only be meant in degrees.
+    """
+
+    check: Callable[[Any], Any]
+    schema: Mapping[str, Any]
+    units: tuple[str, ...] = ()
+    per_joint: bool = False
+    within_turn: bool = False
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+    def __get_pydantic_json_schema__(self, _schema: Any, _handler: Any) -> dict[str, Any]:
+        return dict(self.schema)
+
+
+def of_kind(kind: type | tuple[type, ...], what: str) -> Callable[[Any], Any]:
+    """Return a function that refuses what is not of a kind, and says what was expected."""
 
     def check(value: Any) -> Any:
         sound = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
@@ -23,7 +66,7 @@ def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -
             raise ValueError(f"is {value!r}, expected {what}")
         return value
 
-    return Annotated[Any, PlainValidator(check), WithJsonSchema(schema)]
+    return check
 
 
 def _is_sensible(value: float) -> bool:
@@ -49,13 +92,6 @@ def _numbers(value: Any) -> Any:
     return value
 
 
-def _pose(value: Any) -> Any:
-    try:
-        return pose_of(value)
-    except PathError as error:
-        raise ValueError(str(error)) from error
-
-
 def _axis(value: Any) -> Any:
     if isinstance(value, str):
         if value not in "xyz" or len(value) != 1:
@@ -71,15 +107,20 @@ def _names(value: Any) -> Any:
     return listed
 
 
+def _several_names(value: Any) -> Any:
+    if isinstance(value, str):
+        raise ValueError(f"is {value!r}, expected a list of names")
+    return _names(value)
+
+
 def _coordinates(value: Any) -> Any:
-    """Check a table of joint coordinates."""
-    if not isinstance(value, Mapping) or not all(map(_is_number, value.values())):
+    if not isinstance(value, Mapping) or not all(map(_is_coordinate, value.values())):
         raise ValueError(f"is {value!r}, expected a table of joints and numbers")
     return dict(value)
 
 
-def _is_number(value: Any) -> bool:
-    return _are_numbers(value) and not isinstance(value, list) and _is_sensible(value)
+def _is_coordinate(value: Any) -> bool:
+    return is_number(value) and _is_sensible(value)
 
 
 def _start(value: Any) -> Any:
@@ -88,74 +129,36 @@ def _start(value: Any) -> Any:
     return value if isinstance(value, str) else _numbers(value)
 
 
-_ANY_NUMBERS = {"anyOf": [{"type": "number"}, {"type": "array"}]}
+_NUMBER = {"type": "number"}
+_TRIPLE = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_STRINGS = {"type": "array", "items": {"type": "string"}}
+_ONE = (of_kind((int, float), "a number"), _NUMBER)
+_SOME = (_numbers, {"anyOf": [_NUMBER, {"type": "array"}]})
+_LISTED = (_names, {"anyOf": [{"type": "string"}, {"type": "array"}]})
+_START = {"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}
 
-
-_TRIPLE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
-
-
-_POSE = {
-    "anyOf": [
-        {"type": "array", "minItems": 4, "maxItems": 4},
-        {
-            "title": "Pose",
-            "type": "object",
-            "properties": {"position": _TRIPLE, **{key: {"type": "array"} for key in ORIENTATIONS}},
-            "additionalProperties": False,
-        },
-    ]
-}
-
-
-Number = _checked((int, float), "a number", {"type": "number"})
-
-
-Whole = _checked(int, "a whole number", {"type": "integer"})
-
-
-Flag = _checked(bool, "true or false", {"type": "boolean"})
-
-
-Text = _checked(str, "a text", {"type": "string"})
-
-
-Table = _checked(Mapping, "a table", {"type": "object"})
-
-
-def _keys(*names: str) -> dict[str, Any]:
-    """Return the schema of a table whose own reader refuses other keys."""
-    keys: dict[str, Any] = {name: {"type": "number"} for name in names}
-    keys["axis"] = _TRIPLE
-    return {"type": "object", "properties": keys, "additionalProperties": False}
-
-
-Leads = _checked(Mapping, "a table", _keys("length", "duration"))
-
-
-Weave = _checked(Mapping, "a table", _keys("amplitude", "pitch", "dwell"))
-
-
-Numbers = Annotated[Any, PlainValidator(_numbers), WithJsonSchema(_ANY_NUMBERS)]
-
-
-Axis = Annotated[
-    Any, PlainValidator(_axis), WithJsonSchema({"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})
+# A number: without a unit, and of a length, an angle or either, or a rate of it.
+Number = Annotated[float, Checked(*_ONE)]
+Length = Annotated[float, Checked(*_ONE, ("_mm",))]
+Angle = Annotated[float, Checked(*_ONE, ("_deg",))]
+Turn = Annotated[float, Checked(*_ONE, ("_deg",), within_turn=True)]
+LengthOrAngle = Annotated[float, Checked(*_ONE, ("_deg", "_mm"))]
+# A number, or a list of numbers; those of joints are one for all, or one for each.
+Numbers = Annotated[Any, Checked(*_SOME)]
+Lengths = Annotated[Any, Checked(*_SOME, ("_mm",))]
+Turns = Annotated[Any, Checked(*_SOME, ("_deg",), within_turn=True)]
+Joints = Annotated[Any, Checked(*_SOME, ("_deg",), per_joint=True)]
+Rates = Annotated[Any, Checked(*_SOME, ("_deg", "_mm"))]
+Coordinates = Annotated[
+    dict[str, float], Checked(_coordinates, {"type": "object"}, ("_deg",), per_joint=True)
 ]
-
-
-Pose = Annotated[Any, PlainValidator(_pose), WithJsonSchema(_POSE)]
-
-
-Coordinates = Annotated[Any, PlainValidator(_coordinates), WithJsonSchema({"type": "object"})]
-
-
-Names = Annotated[
-    Any, PlainValidator(_names), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}]})
-]
-
-
-Start = Annotated[
-    Any,
-    PlainValidator(_start),
-    WithJsonSchema({"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}),
-]
+Start = Annotated[Any, Checked(_start, _START, ("_deg",), per_joint=True)]
+Axis = Annotated[Any, Checked(_axis, {"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})]
+Whole = Annotated[int, Checked(of_kind(int, "a whole number"), {"type": "integer"})]
+Flag = Annotated[bool, Checked(of_kind(bool, "true or false"), {"type": "boolean"})]
+Text = Annotated[str, Checked(of_kind(str, "a text"), {"type": "string"})]
+File = Annotated[str, Checked(of_kind(str, "the name of a file"), {"type": "string"})]
+Files = Annotated[list[str], Checked(*_LISTED)]
+Names = Annotated[list[str], Checked(*_LISTED)]
+SeveralNames = Annotated[list[str], Checked(_several_names, _STRINGS)]
+AnyTable = Annotated[dict[str, Any], Checked(of_kind(Mapping, "a table"), {"type": "object"})]

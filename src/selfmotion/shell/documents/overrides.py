@@ -1,4 +1,4 @@
-"""Keys of a document set from outside: on the command line, and by a grid."""
+"""Documents changed from outside: keys on the command line and of a grid, a moved workpiece."""
 
 import itertools
 import json
@@ -8,7 +8,16 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, nearest, read_document, read_values, write_document
+from selfmotion.basics import (
+    FileFormatError,
+    in_si,
+    nearest,
+    read_document,
+    read_values,
+    write_document,
+)
+from selfmotion.model.path import pose_of
+from selfmotion.model.task import SE3
 from selfmotion.problem.costs import JointVelocity
 from selfmotion.problem.problem import KEPT
 from selfmotion.shell.documents.named_files import named_from
@@ -188,3 +197,25 @@ def write_combination(file: Path, settings: Mapping[str, Any], target: Path) -> 
     for key, value in settings.items():
         set_key(document, key, value)
     write_document(target, named_from(document, file.resolve().parent, target.resolve().parent))
+
+
+def belonging(document: Mapping[str, Any]) -> tuple[str, ...] | None:
+    """Return the names of bodies that belong to the workpiece of a document; None without one."""
+    piece = document.get("workpiece")
+    if not isinstance(piece, Mapping):
+        return None
+    names = [str(item.get("name")) for item in piece.get("obstacles", [])]
+    return (*names, *(["workpiece"] if "mesh" in piece else []))
+
+
+def moved_workpiece(document: Mapping[str, Any], by: SE3) -> dict[str, Any]:
+    """Return a document whose workpiece is moved, with all that is in its frame.
+
+    By a rigid motion in the frame in which the workpiece stands. One without a workpiece gets one,
+    in which its paths are.
+    """
+    piece = document.get("workpiece", {})
+    frame = piece.get("frame", {})
+    place = by * pose_of(in_si(frame) if isinstance(frame, Mapping) else frame)
+    stands = {"position": place.translation.tolist(), "rotation": place.rotation.tolist()}
+    return {**document, "workpiece": {**piece, "frame": stands}}

@@ -15,7 +15,6 @@ from selfmotion.shop.cam.path_files import (
     read_seams as read_seams,
 )
 from selfmotion.shop.cam.pose_rows import (
-    READING as READING,
     Reading as Reading,
 )
 from selfmotion.shop.cam.ros_messages import (

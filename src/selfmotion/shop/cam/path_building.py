@@ -64,7 +64,6 @@ class Pacing:
     smoothing: float | None = None
     within: float | None = None
     ramp: float | None = None
-    flip_normals: bool = False
     standoff: float = 0.0
     along: str | None = None
     lead: float = 0.0
@@ -90,8 +89,6 @@ def path_of_rows(path: FilePath, rows: PoseRows, pacing: Pacing) -> Path:
     if len(rows.positions) < 2:
         raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
     _check_rows(path, rows)
-    if pacing.flip_normals:
-        rows = _with_flipped_normals(path, rows)
     rotations = _rotations(path, rows)
     _check_jumps(path, rows, rotations, pacing.jump)
     rows, rotations = _without_stubs(rows, rotations, pacing)
@@ -230,15 +227,6 @@ def _with_deviation_note(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -
         )
         return path.noted([note])
     return path
-
-
-def _with_flipped_normals(file: FilePath, rows: PoseRows) -> PoseRows:
-    """Return rows whose normals point the other way."""
-    if rows.orientation != "normal":
-        raise FileFormatError(
-            f"{file}: flip_normals has no effect: it has no columns nx,ny,nz; drop it"
-        )
-    return replace(rows, values=-rows.values)
 
 
 def _with_standoff(file: FilePath, rows: PoseRows, rotations: Array, standoff: float) -> PoseRows:

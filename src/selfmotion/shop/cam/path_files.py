@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -245,7 +246,6 @@ def read_path(
             "smoothing": smoothing,
             "within": within,
             "ramp": ramp,
-            "flip_normals": flip_normals,
             "standoff": standoff,
             "along": along,
             "lead": lead,
@@ -255,7 +255,8 @@ def read_path(
     )
     table = {"rotary": rotary, "rotary_axes": rotary_axes, "rotary_center": rotary_center}
     reading = Reading.of(path, {"columns": columns, "unit": unit, **table})
-    return path_of_rows(path, one_seam(path, seam, reading), pacing)
+    rows = _facing(path, one_seam(path, seam, reading), flip_normals)
+    return path_of_rows(path, rows, pacing)
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
@@ -275,8 +276,22 @@ def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Pa
         raise FileFormatError(
             f"{file}: has no column 'seam', expected one that names the seam of each row"
         )
-    pacing = _pacing(file, options)
-    return {name: (path_of_rows(file, rows, pacing), rows) for name, rows in seams.items()}
+    flips, pacing = options.pop("flip_normals", False), _pacing(file, options)
+    return {
+        name: (path_of_rows(file, _facing(file, rows, flips), pacing), rows)
+        for name, rows in seams.items()
+    }
+
+
+def _facing(file: FilePath, rows: PoseRows, flips: bool) -> PoseRows:
+    """Return rows whose normals point into the part, the other way where they are to be flipped."""
+    if not as_flag(flips, f"{file}: flip_normals", FileFormatError):
+        return rows
+    if rows.orientation != "normal":
+        raise FileFormatError(
+            f"{file}: flip_normals has no effect: it has no columns nx,ny,nz; drop it"
+        )
+    return replace(rows, values=-rows.values)
 
 
 def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
@@ -290,7 +305,6 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
                 f"{path}: {name} is {lean:g} rad, expected less than a quarter turn"
             )
     as_number(pacing.lift, f"{path}: lift", least=0.0, error=FileFormatError)
-    as_flag(pacing.flip_normals, f"{path}: flip_normals", FileFormatError)
     for name, value in (("feed", pacing.feed), ("duration", pacing.duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
