@@ -120,7 +120,11 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("planning/nodes/objective.py", "planning/nodes/smoothness.py"),
+        (
+            "planning/nodes/objective.py",
+            "planning/nodes/quadratic.py",
+            "planning/nodes/smoothness.py",
+        ),
         ("nodes/test_objective.py", "nodes/test_smoothness.py", "nodes/test_newton.py"),
     ),
     Part(

@@ -7,7 +7,14 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
-from selfmotion.planning.nodes import carried, conservatism, minimise, on_grid, subdivisions
+from selfmotion.planning.nodes import (
+    by_kind,
+    carried,
+    conservatism,
+    minimise,
+    on_grid,
+    subdivisions,
+)
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.rows import sampled_curve
@@ -138,6 +145,27 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
         )
         for mine, theirs in zip(*parts, strict=True):
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)
+
+
+@pytest.mark.parametrize("name", ["rates", "positions", "two"])
+def test_limits_are_those_of_the_control_points_each_once(panda: sm.RobotModel, name: str) -> None:
+    """Of q, q̇ and q̈ two intervals share one; the last one of the motion belongs to its own."""
+    motion = motion_with(panda, name)
+    rows, spline = motion.grid.rows, motion.grid.spline
+    for own, h in zip(rows.limits, by_kind(rows, motion.h)[0], strict=True):
+        item = own.item
+        x = spline.at(AT_CONTROLS, item.order, motion.curve_ends)[:, :, own.joints]
+        sides = np.stack([x - item.upper, item.lower - x], axis=2) / item.scale
+        expected = sides + item.margin - item.granted
+        shared = np.zeros(expected.shape, dtype=bool)
+        if item.order < 3:
+            shared[:-1, -1] = True
+        np.testing.assert_allclose(h[~shared], expected[~shared], rtol=1e-9, atol=1e-12)
+        assert (h[shared] < -500.0).all()
+        # Active are all of a joint and side, one of which is near.
+        near = by_kind(rows, rows.near(motion.h))[0][rows.limits.index(own)]
+        column = np.where(shared, -np.inf, h).max(axis=(0, 1)) > -0.3
+        np.testing.assert_array_equal(near, column & ~shared)
 
 
 @pytest.mark.parametrize("name", ["rates", "positions", "tool"])
