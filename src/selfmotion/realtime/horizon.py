@@ -16,6 +16,7 @@ from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION
+from selfmotion.realtime.quantities import Quantities
 from selfmotion.realtime.settings import (
     BADLY,
     BREAKING,
@@ -163,6 +164,8 @@ class Horizon:
         Runge-Kutta steps.
     surroundings : Surroundings, optional
         Collision constraints.
+    quantities : Quantities, optional
+        Other constraints.
 
     Attributes
     ----------
@@ -181,6 +184,7 @@ class Horizon:
         duration: float,
         steps: int,
         surroundings: Surroundings | None = None,
+        quantities: Quantities | None = None,
     ) -> None:
         self.grid = Grid(graded(duration, steps))
         robot = follows.robot
@@ -188,6 +192,7 @@ class Horizon:
         self.redundancy = follows.redundancy
         self._costs, self._duration = tuple(costs), duration
         self._null_motion, self._around = null_motion, surroundings
+        self._quantities = quantities
         t = self.grid.stage_times
         self._functions = null_motion.functions(t, duration)
         self._inverse = np.linalg.pinv(self._functions)
@@ -386,15 +391,18 @@ class Horizon:
     ) -> tuple[Array, Array, Array]:
         """Return rows (R, d) of the limits and distances, and their bounds, (R,) each."""
         rows, low, high = self._rows(samples, by_q, by_qd)
+        below = []
         if len(self._curved):
-            more, room = self._curve_rows(samples, by_q, by_qd)
-            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
-            low = np.concatenate([low, np.full(len(more), -np.inf)])
+            below.append(self._curve_rows(samples, by_q, by_qd))
         if self._around is not None:
-            more, room = self._around.rows(samples, by_q)
-            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
-            low = np.concatenate([low, np.full(len(more), -np.inf)])
-        return rows, low, high
+            below.append(self._around.rows(samples, by_q))
+        if self._quantities is not None:
+            below.append(self._quantities.rows(samples, by_q, by_qd))
+        if not below:
+            return rows, low, high
+        room = np.concatenate([each for _, each in below])
+        rows = np.vstack([rows, *(more for more, _ in below)])
+        return rows, np.append(low, np.full(len(room), -np.inf)), np.append(high, room)
 
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
         """Return the limits at the nodes as rows of the step, with their bounds."""

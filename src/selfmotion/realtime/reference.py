@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -137,6 +137,20 @@ class Approach:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             as_number(getattr(self, name), f"approach: {name}", above=0.0)
+
+    def within(self, limit: Array) -> Approach:
+        """Return the approach that leaves half of the tool's limits (4,) to the path's own motion.
+
+        Of speed, turn rate, acceleration and turn acceleration.
+        """
+        names = "speed", "turning", "acceleration", "turning_acceleration"
+        return replace(
+            self,
+            **{
+                name: min(getattr(self, name), 0.5 * float(most))
+                for name, most in zip(names, limit, strict=True)
+            },
+        )
 
     @property
     def numbers(self) -> Array:

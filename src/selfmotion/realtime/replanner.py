@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from selfmotion.model.motion import NullMotion, PolynomialNullMotion
 from selfmotion.model.path import Dwell, Path, PathSamples
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Task
-from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.constraints import Constraint, ToolLimits
 from selfmotion.problem.costs import Cost, JointVelocity
 from selfmotion.realtime import law
 from selfmotion.realtime.checks import (
@@ -35,16 +35,16 @@ from selfmotion.realtime.chunks import Chunk, blend
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import (
     Commands,
-    Flag,
-    Segment,
     cycles_of_mean,
     joint_limits,
     kept_envelope,
     planned_limits,
 )
 from selfmotion.realtime.horizon import Horizon
+from selfmotion.realtime.quantities import Quantities, is_quantity
 from selfmotion.realtime.reference import Approach, LastPath, Reference
-from selfmotion.realtime.settings import AHEAD, SOON
+from selfmotion.realtime.segment import Flag, Segment
+from selfmotion.realtime.settings import AHEAD, GENTLER, GENTLEST, HARDER, SOON
 
 
 class Replanner:
@@ -57,6 +57,8 @@ class Replanner:
 
     Limits of position, velocity, acceleration and jerk hold for every command, at all times and in
     all events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
+    Distances and quantities are rows of the plan, and proved of each segment to its rest before it
+    is issued: without a proof the segment before, which has one, runs to its rest.
 
     Parameters
     ----------
@@ -67,8 +69,9 @@ class Replanner:
         By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
         `JointPositionLimits`, `JointVelocityLimits`, `JointAccelerationLimits`, `JointJerkLimits`
-        and `PositionDependentVelocityLimits`, by default those of the arm and its maker, and
-        `Clearance`, whose obstacles may move.
+        and `PositionDependentVelocityLimits`, by default those of the arm and its maker;
+        `Clearance`, of which there may be several, and whose obstacles may move; and whatever
+        limits a quantity: torques, bands, tilts, the tool's speed and acceleration, or your own.
     horizon : float
         How far ahead is planned [s].
     null_motion : NullMotion
@@ -135,15 +138,36 @@ class Replanner:
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         self._around = Surroundings(robot, envelope.bodies) if envelope.bodies else None
+        mean = cycles_of_mean(robot, envelope, self.cycle)
+        others, jerk = (
+            [item for item in constraints if is_quantity(item)],
+            2.0 / (mean * self.cycle),
+        )
+        fastest = np.stack([limits[2], limits[3], jerk * limits[3]])
+        self._quantities = Quantities(robot, others, fastest, self.cycle) if others else None
         self._horizon = Horizon(
-            follows, costs, planned_limits(limits), null_motion, self.horizon, steps, self._around
+            follows,
+            costs,
+            planned_limits(limits),
+            null_motion,
+            self.horizon,
+            steps,
+            self._around,
+            self._quantities,
         )
         self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
-        mean = cycles_of_mean(robot, envelope, self.cycle)
-        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling, mean)
+        gentler = self._quantities is not None and self._quantities.by_acceleration
+        gentlest = GENTLEST if gentler else 1.0
+        self._commands = Commands(
+            robot, limits, self.cycle, self._cycles, latency, settling, mean, gentlest
+        )
+        self._gentlest, self._share = gentlest, 1.0
         self._prepare()
         self._approach = approach or Approach()
+        for item in constraints:
+            if isinstance(item, ToolLimits):
+                self._approach = self._approach.within(item.limit)
         self._reference = Reference(follows, self._approach, self._times)
         self._started = False
 
@@ -283,8 +307,12 @@ class Replanner:
                 first = self._cycles
             else:
                 flag = Flag.STOPPING
-        issued = commands.segment(first, flag, tuple(reasons), follows, error)
-        unproved = self._unproved(issued)
+        said = tuple(reasons)
+        issued, unproved = self._braked(
+            lambda share: commands.segment(first, flag, said, follows, error, share)
+        )
+        if not unproved and self._around is not None:
+            unproved = self._around.unproved(*self._expected(issued))
         if unproved:
             # The segment before, which is proved, runs to its stop.
             reasons.append(unproved)
@@ -304,23 +332,40 @@ class Replanner:
             reasons.append(f"the chunk is not joined: {type(error).__name__}: {error}")
             return chunk
 
-    def _unproved(self, segment: Segment) -> str:
-        """Return why a segment is not proved to keep the arm clear of bodies; "" where it is.
+    def _braked(self, made: Callable[[float], Segment]) -> tuple[Segment, str]:
+        """Return a segment that brakes by some share of the limits, and why it is not proved.
+
+        "" where all quantities are: else braking is tried more gently, and harder again at the next
+        steps.
+        """
+        issued = made(self._share)
+        if self._quantities is None:
+            return issued, ""
+        while unproved := self._quantities.unproved(issued, self._commands.deviation):
+            if self._share <= self._gentlest:
+                break
+            self._share = max(GENTLER * self._share, self._gentlest)
+            issued = made(self._share)
+        self._share = min(HARDER * self._share, 1.0)
+        return issued, unproved
+
+    def _expected(self, segment: Segment) -> tuple[Array, Array, Array]:
+        """Return where the arm is expected, path lengths and times of a segment.
 
         At the expected position: the command plus the present deviation.
         """
-        if self._around is None:
-            return ""
-        q, times = segment.q + self._commands.deviation, segment.t - segment.t[0]
-        return self._around.unproved(q, segment.travelled, times)
+        place = segment.q + self._commands.deviation
+        return place, segment.travelled, segment.t - segment.t[0]
 
     def _start(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)
         self._path = LastPath(self._patience)
         self._without_state = self._without_motion = 0.0
         self._horizon.forget()
-        if self._around is not None:
-            self._around.forget()
+        self._share = 1.0
+        for kept in (self._around, self._quantities):
+            if kept is not None:
+                kept.forget()
         self._follows = self._started = True
 
     def _last_reference_twist(self, passed: float) -> Array | None:

@@ -78,6 +78,26 @@ BREAKING = 1e3
 # Range of distances [m].
 DISTANCES = 0.1
 
+# --- quantities
+# Share of a quantity's limit that plans leave unused, for the feedback and the time between nodes.
+QUANTITY_RESERVE = 0.05
+# Rows with more room than this share of their limit are left out of a step.
+NEAR_LIMIT = 0.5
+# Rows that no self-motion changes have no larger entry [shares of the limit].
+UNMOVED = 1e-9
+# Time in which plans leave what is exceeded [s].
+LEAVING_IN = 0.5
+# Share of a limit that is kept for bounds: of what is beside it, all segments together use it once.
+QUANTITY_BEYOND = 1e-4
+# Cycles in a group with bounds of its own, and after which what is no function of q̈ is measured.
+STRIDE = 8
+# Factor of the deceleration of stops that are not proved …
+GENTLER = 0.5
+# … the gentlest, as a share of the limit …
+GENTLEST = 0.125
+# … and by how much it grows again from one step to the next.
+HARDER = 1.1
+
 # --- obstacles that move
 # Clearance of plans in addition to the required one, for the time between nodes [m].
 CLEARANCE_MARGIN = 5e-3
