@@ -205,8 +205,8 @@ class Commands:
         Time constant [s] of the filter of the arm's deviation from its command.
     mean : int
         Number M of cycles of the mean.
-    gentlest : float
-        Least share of the limits of acceleration by which it may be brought to rest.
+    longest : float
+        Time that a stop may take where it need not be the hardest [s].
 
     Attributes
     ----------
@@ -225,13 +225,14 @@ class Commands:
         latency: float,
         settling: float,
         mean: int = 1,
-        gentlest: float = 1.0,
+        longest: float = 0.0,
     ) -> None:
         self._robot, self._cycle, self._settling = robot, cycle, settling
         # The last row is the arm's deviation from its command.
         self._limits = np.vstack([tightened(limits), np.zeros(robot.dof)])
         # Number of cycles in which every joint stops from its highest speed.
-        stopping = int(np.ceil((limits[2] / (gentlest * limits[3] * cycle)).max())) + 3
+        stopping = int(np.ceil((limits[2] / (limits[3] * cycle)).max())) + 3
+        stopping = max(stopping, round(longest / cycle))
         # c, w and a of each cycle; see `viable_accelerations`.
         self._states = np.zeros((cycles + stopping + mean, 3, robot.dof))
         # Those of the M - 1 cycles before.
@@ -327,6 +328,7 @@ class Commands:
         reasons: tuple[str, ...],
         follows: bool,
         error: Array,
+        delay: float,
         share: float = 1.0,
     ) -> Segment:
         """Return the commands: from cycle `first` on, the arm is brought to rest.
@@ -342,7 +344,7 @@ class Commands:
             end = law.brake(self._states, first, self._limits, share, h)
         # After the end the arm rests.
         self._states[end + 1 :] = self._states[end]
-        end = max(end + len(self._past), 1)
+        end = max(min(end + len(self._past), len(self._states) - 1), 1)
         q, qd, qdd = np.moveaxis(self._commanded(end), 1, 0)
         return Segment(
             t=np.asarray(self.time + h * np.arange(end + 1), dtype=np.float64),
@@ -353,6 +355,7 @@ class Commands:
             reasons=reasons,
             follows=follows,
             tool_error=error,
+            delay=delay,
         )
 
     def _commanded(self, end: int) -> Array:

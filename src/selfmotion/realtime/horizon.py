@@ -1,6 +1,7 @@
 """The self-motion over the next seconds: one step of its quadratic programme for each cycle."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION
+from selfmotion.realtime.pace import Pace
 from selfmotion.realtime.quantities import Quantities
 from selfmotion.realtime.settings import (
     BADLY,
@@ -125,6 +127,15 @@ def model_of(
     return gradient, metric
 
 
+def is_damped(gram: Array) -> Any:
+    """Return whether commands damp the inverse of JJᵀ (…, m, m), by its smallest pivot."""
+    try:
+        factor = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return np.ones(gram.shape[:-2], dtype=bool)
+    return (np.diagonal(factor, axis1=-2, axis2=-1) ** 2 < PIVOT).any(axis=-1)
+
+
 def graded(duration: float, steps: int) -> Array:
     """Return nodes from 0 to `duration` [s]: the first ones near each other, later ones farther.
 
@@ -169,10 +180,14 @@ class Horizon:
 
     Attributes
     ----------
+    pace : Pace
+        At what rate the path is followed.
     elastic : bool
         Whether the last step could not keep all limits and distances.
     breakdown : float
         When the last motion ran into a singular pose [s]; inf where it did not.
+    damped : float
+        When it came so near one that commands would leave a path there [s]; likewise.
     """
 
     def __init__(
@@ -193,6 +208,10 @@ class Horizon:
         self._costs, self._duration = tuple(costs), duration
         self._null_motion, self._around = null_motion, surroundings
         self._quantities = quantities
+        self.pace = Pace(duration, self.grid.nodes)
+        # Made once.
+        self.grid.sampling.node_differentiation(1)
+        self._along = np.zeros((0, 6))
         t = self.grid.stage_times
         self._functions = null_motion.functions(t, duration)
         self._inverse = np.linalg.pinv(self._functions)
@@ -223,7 +242,14 @@ class Horizon:
         self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
         self._damping = 1.0
-        self.elastic, self.breakdown = False, np.inf
+        self.elastic = False
+        self.breakdown = self.damped = float(np.inf)
+
+    def start_anew(self) -> None:
+        """Restart after a failure, which is still told."""
+        when = self.breakdown
+        self.forget()
+        self.breakdown = when
 
     @property
     def size(self) -> int:
@@ -261,7 +287,9 @@ class Horizon:
         """Return φ at times `t` (M,), (M, K)."""
         return self._null_motion.functions(np.minimum(t, self._duration), self._duration)
 
-    def improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
+    def improve(
+        self, q: Array, rate: Array, jacobian: Array, reference: PathSamples, along: Array
+    ) -> bool:
         """Make one step from a configuration and rate, along a reference given at the stages.
 
         Parameters
@@ -270,12 +298,15 @@ class Horizon:
         jacobian : (m, n)
             Task Jacobian at q.
         reference : PathSamples
+        along : (S, 6)
+            By how much its twist grows with the pace; 0 where it has none.
 
         Returns
         -------
         bool
-            Whether there is a motion: if not, only the effect of `forget` has changed.
+            Whether there is a motion.
         """
+        self._along = along[self.grid.node_stages]
         # Near singular poses numbers may overflow: such motions are rejected.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._improve(q, rate, jacobian, reference)
@@ -294,9 +325,6 @@ class Horizon:
         stages = self._blend(self._node, self._share)
         outer = stages @ (self._functions @ self._coefficients.T)[:, :, None]
         if not self._run(q, outer[:, :, 0]):
-            when = self.breakdown
-            self.forget()
-            self.breakdown = when
             return False
         basis = self._functions @ self._rest
         by_epsilon = (stages[:, :, :, None] * basis[:, None, None, :]).reshape(
@@ -304,10 +332,10 @@ class Horizon:
         )
         tangents = self.rollout.sensitivities(by_epsilon, np.zeros((len(q), self.size)))
         samples = self.rollout.samples()
+        self.damped = self._first_damped(samples)
         cost = self._cost(samples) if self._guesses else 0.0
         found = self._step(samples, *tangents)
         if found is None:
-            self.forget()
             return False
         step, predicted = found
         here = np.ascontiguousarray(samples.task_jacobian[self.grid.node_stages])
@@ -316,6 +344,16 @@ class Horizon:
             self._coefficients = better
         transport(first[0], here, PIVOT, self._frames)
         return True
+
+    def _first_damped(self, samples: Samples) -> float:
+        """Return when the inverse of the task Jacobian is damped first, inf for never.
+
+        Of a path that is followed on time the end tells, until it is not.
+        """
+        nodes = samples.nodes[-1:] if self.pace.is_on_time else samples.nodes
+        jacobian = samples.task_jacobian[nodes]
+        near = is_damped(jacobian @ np.swapaxes(jacobian, 1, 2))
+        return float(samples.t[nodes[np.argmax(near)]]) if near.any() else np.inf
 
     def _cost(self, samples: Samples) -> float:
         return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
@@ -379,12 +417,60 @@ class Horizon:
             return None
         d = self.size
         metric[np.diag_indices(d)] += REGULAR * (np.trace(metric) + 1e-12)
-        limits = self._conditions(samples, by_q, by_qd)
+        # Where self-motions alone could not keep all limits, or the tool is late.
+        paced = bool(self._along.any()) and (self.elastic or not self.pace.is_on_time)
         try:
-            step, self.elastic = elastic_step(metric, gradient, *limits)
+            if paced:
+                step = self._with_pace(metric, gradient, samples, by_q, by_qd)
+            else:
+                limits = self._conditions(samples, by_q, by_qd)
+                step, self.elastic = elastic_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)
+
+    def _with_pace(
+        self, metric: Array, gradient: Array, samples: Samples, by_q: Array, by_qd: Array
+    ) -> Array:
+        """Return the step of the coefficients (d,), and change the pace, both by one programme.
+
+        The cost is that of the self-motion, and no reason to be late.
+        """
+        d, pace = self.size, self.pace
+        slower, pull, limits = pace.programme(float(np.trace(metric)) / d)
+        more = len(pull)
+        tangents = self._by_pace(samples)
+        whole = (np.concatenate(pair, axis=2) for pair in zip((by_q, by_qd), tangents, strict=True))
+        rows, low, high = self._conditions(samples, *whole)
+        paces, least, most = limits
+        both = np.block([[metric, np.zeros((d, more))], [np.zeros((more, d)), slower]])
+        step, self.elastic = elastic_step(
+            both,
+            np.append(gradient, pull),
+            np.vstack([rows, np.hstack([np.zeros((len(paces), d)), paces])]),
+            np.append(low, least),
+            np.append(high, most),
+        )
+        pace.change(step[d:])
+        return step[:d]
+
+    def _by_pace(self, samples: Samples) -> tuple[Array, Array]:
+        """Return ∂q and ∂q̇ by all rates of the pace but the first at the nodes, (S, n, J) each.
+
+        By δq = J⁺x' δs for the path x(s): what the self-motion changes on the way is left out.
+        """
+        nodes, n = samples.nodes, samples.q.shape[1]
+        jacobian, item = samples.task_jacobian[nodes], samples.follows.items[0]
+        slopes = item.task.select_along(self._along[:, :, None], samples.rotation[nodes])
+        across = np.swapaxes(jacobian, 1, 2)
+        gram = jacobian @ across + PIVOT * np.eye(jacobian.shape[1])
+        by_s = (across @ np.linalg.solve(gram, slopes))[:, :, 0]
+        turning = samples.sampling.node_differentiation(1) @ by_s
+        rates, progress = (part[:, 1:] for part in self.pace.at_nodes)
+        by_q, by_qd = (np.zeros((len(samples.q), n, rates.shape[1])) for _ in range(2))
+        by_q[nodes] = by_s[:, :, None] * progress[:, None]
+        by_qd[nodes] = by_s[:, :, None] * rates[:, None] + turning[:, :, None] * progress[:, None]
+        return by_q, by_qd
 
     def _conditions(
         self, samples: Samples, by_q: Array, by_qd: Array
@@ -406,7 +492,7 @@ class Horizon:
 
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
         """Return the limits at the nodes as rows of the step, with their bounds."""
-        nodes, d = samples.nodes, self.size
+        nodes, d = samples.nodes, by_q.shape[2]
         pause = np.diff(self.grid.nodes)[:, None]
         qd, moves = samples.qd[nodes], by_qd[nodes]
         value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
@@ -423,4 +509,4 @@ class Horizon:
         above, below = curves.slopes(qd)
         rows = np.stack([at + above[..., None] * moves, -at + below[..., None] * moves])
         room = -curves.excess(samples.q[nodes][:, some], qd)
-        return rows.reshape(-1, self.size), room.ravel()
+        return rows.reshape(-1, by_q.shape[2]), room.ravel()

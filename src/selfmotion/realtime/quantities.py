@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from typing_extensions import override
@@ -15,6 +16,7 @@ from selfmotion.problem.constraints import Constraint, NodeTangents, linearised
 from selfmotion.problem.costs import PlacedLater, Samples
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.settings import (
+    ACCELERATED_RESERVE,
     FARTHEST,
     LEAVING_IN,
     NEAR_LIMIT,
@@ -33,6 +35,13 @@ _LENGTH_OF_ACCELERATION = 5
 def is_quantity(item: Constraint) -> bool:
     """Return whether a constraint says what it limits by `Constraint.quantity`."""
     return type(item).quantity is not Constraint.quantity
+
+
+class Unproved(NamedTuple):
+    """What is not proved of a segment, in words, and at about what time of it [s]."""
+
+    reason: str
+    time: float
 
 
 class Quantities:
@@ -61,7 +70,8 @@ class Quantities:
     ) -> None:
         self._robot = robot
         self._near: _NearTimes | None = None
-        self._conditions = [at for item in constraints for at in item.conditions(robot).points]
+        points = [at for item in constraints for at in item.conditions(robot).points]
+        self._conditions = [(at, at.uses_accelerations(robot.dof)) for at in points]
         anywhere = _Groups(robot, cycle, fastest[..., None], np.full((3, 1, robot.dof), np.nan))
         self._proofs = [_Proof(item.quantity(robot), anywhere) for item in constraints]
         self.by_acceleration = any(proof.by_acceleration for proof in self._proofs)
@@ -82,10 +92,12 @@ class Quantities:
         between = PlacedLater(samples.follows, near.sampling, q=q, qd=qd)
         motion = NodeTangents(*near.motion(by_q[nodes], by_qd[nodes]), near.sampling)
         rows, room = [np.zeros((0, motion.size))], [np.zeros(0)]
-        for item in self._conditions:
+        for item, accelerated in self._conditions:
             h = item.residual(between)
-            beyond = np.maximum(h[0] + QUANTITY_RESERVE, 0.0) * later
-            left = beyond - QUANTITY_RESERVE - h
+            reserve = ACCELERATED_RESERVE if accelerated else QUANTITY_RESERVE
+            # Accelerations may be others at once.
+            beyond = 0.0 if accelerated else np.maximum(h[0] + reserve, 0.0) * later
+            left = beyond - reserve - h
             # The present is what it is.
             left[0] = np.inf
             which = np.flatnonzero(left < NEAR_LIMIT)
@@ -96,14 +108,16 @@ class Quantities:
                 room.append(left.ravel()[which[moved]])
         return np.concatenate(rows), np.concatenate(room)
 
-    def unproved(self, segment: Segment, deviation: Array) -> str:
-        """Return why a segment is not proved to keep the limits; "" where it is.
+    def unproved(self, segment: Segment, deviation: Array) -> Unproved | None:
+        """Return where a segment is not proved to keep the limits; None where it is everywhere.
 
         At the expected position: the command plus the present deviation (n,).
         """
+        if np.any(segment.qd[-1]):
+            return Unproved("it is not proved that the arm comes to rest in time", np.inf)
         segments = _Groups.of_segment(self._robot, segment, deviation)
         each = (proof.unproved(segments) for proof in self._proofs)
-        return next((said for said in each if said), "")
+        return next((said for said in each if said is not None), None)
 
 
 class _NearTimes:
@@ -249,11 +263,11 @@ class _Proof:
         self._most = np.minimum(before, np.maximum(now, 1.0))
         return np.where(now > 1.0, np.maximum(self._most + QUANTITY_BEYOND, now), 1.0)
 
-    def unproved(self, segments: _Groups) -> str:
-        """Return why a segment is not proved to keep the limits; "" where it is."""
+    def unproved(self, segments: _Groups) -> Unproved | None:
+        """Return where a segment is not proved to keep the limits; None where it is everywhere."""
         quantity, shares = self._quantity, self._shares
         if not len(quantity.limited):
-            return ""
+            return None
         allowed, bends = None, None
         for steps in self._steps:
             u = np.linspace(-1.0, 1.0, steps + 1)
@@ -262,19 +276,21 @@ class _Proof:
             allowed = self.allowed(sizes[0, 0]) if allowed is None else allowed
             # Written so that NaN proves nothing.
             if np.all(largest + self._always / steps**2 <= allowed):
-                return ""
+                return None
             bends = self._between(segments) if bends is None else bends
             most = largest + bends / steps**2
             broken = ~(most <= allowed)
             if not broken.any():
-                return ""
+                return None
             if (~(largest <= allowed)).any():
                 break
         row, which = np.argwhere(broken)[0]
         label = quantity.columns[int(quantity.limited[which])].label
-        return (
-            f"{label} is not proved to keep its limit until {segments.middle[row]:.3f} s: it "
-            f"uses up to {most[row, which]:.4g} times that"
+        time = float(segments.middle[row])
+        return Unproved(
+            f"{label} is not proved to keep its limit until {time:.3f} s: it uses up to "
+            f"{most[row, which]:.4g} times that",
+            time,
         )
 
     def _between(self, segments: _Groups) -> Array:

@@ -55,7 +55,10 @@ class Segment:
     follows : bool
         Whether the tool moves as planned: not with joints at their limits.
     tool_error : (2,)
-        Distance of the tool from the path at the segment's start, by the measured state [m, rad].
+        Distance of the tool from the path at the segment's start, by the measured state [m, rad]:
+        from where the path was `delay` ago.
+    delay : float
+        By how much the tool is late on its path at the segment's start [s].
     """
 
     t: Array
@@ -66,6 +69,7 @@ class Segment:
     reasons: tuple[str, ...]
     follows: bool
     tool_error: Array
+    delay: float
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "qd", "qdd", "tool_error"):
