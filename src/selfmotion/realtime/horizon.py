@@ -136,6 +136,11 @@ def is_damped(gram: Array) -> Any:
     return (np.diagonal(factor, axis1=-2, axis2=-1) ** 2 < PIVOT).any(axis=-1)
 
 
+def _blend(frames: Array, node: Array, share: Array) -> Array:
+    """Return frames between nodes, by a share of the way to the next one."""
+    return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
+
+
 def graded(duration: float, steps: int) -> Array:
     """Return nodes from 0 to `duration` [s]: the first ones near each other, later ones farther.
 
@@ -173,6 +178,8 @@ class Horizon:
         How far ahead it plans [s].
     steps : int
         Runge-Kutta steps.
+    commands : (M,)
+        Times from now on at which ε is commanded [s].
     surroundings : Surroundings, optional
         Collision constraints.
     quantities : Quantities, optional
@@ -198,6 +205,7 @@ class Horizon:
         null_motion: NullMotion,
         duration: float,
         steps: int,
+        commands: Array,
         surroundings: Surroundings | None = None,
         quantities: Quantities | None = None,
     ) -> None:
@@ -218,7 +226,7 @@ class Horizon:
         now = self._functions[0]
         self._first = now / (now @ now)
         self._rest = null_space(now[None])
-        self._shifts: dict[float, Array] = {}
+        self._shifts: dict[float, tuple[Array, tuple[Array, Array]]] = {}
         self._metrics = [item for cost in costs for item in cost.curvature(robot.dof).items()]
         # Costs whose curvature is not known.
         self._guesses = any(not cost.curvature(robot.dof) for cost in costs)
@@ -233,7 +241,8 @@ class Horizon:
         self._wild = WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
-        self._node, self._share = self._between(t)
+        self._stages = self._between(t)
+        self._commands, self._at_commands = self._between(commands), self._functions_at(commands)
         self.forget()
 
     def forget(self) -> None:
@@ -269,21 +278,27 @@ class Horizon:
             return
         if seconds not in self._shifts:
             self._shifts.clear()
-            later = np.minimum(self.grid.stage_times + seconds, self._duration)
-            moved = self._null_motion.functions(later, self._duration)
-            self._shifts[seconds] = (self._inverse @ moved).T
-        self._coefficients = self._coefficients @ self._shifts[seconds]
-        self._frames = self._blend(*self._between(self.grid.nodes + seconds))
+            moved = self._functions_at(self.grid.stage_times + seconds)
+            between = self._between(self.grid.nodes + seconds)
+            self._shifts[seconds] = (self._inverse @ moved).T, between
+        matrix, between = self._shifts[seconds]
+        self._coefficients = self._coefficients @ matrix
+        self._frames = _blend(self._frames, *between)
 
-    def epsilon(self, t: Array, functions: Array) -> Array:
-        """Return ε at times `t` (M,) from now [s], for φ there (M, K), (M, n)."""
-        n = self.rollout.robot.dof
-        if not len(self._frames):
-            return np.zeros((len(t), n))
-        frames = self._blend(*self._between(t))
-        return np.asarray((frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0])
+    @property
+    def plan(self) -> tuple[Array, Array]:
+        """Frames and coefficients as they are now."""
+        return self._frames.copy(), self._coefficients
 
-    def functions(self, t: Array) -> Array:
+    def epsilon(self, plan: tuple[Array, Array]) -> Array:
+        """Return ε of a plan at the commands (M,), (M, n)."""
+        frames, coefficients = plan
+        if not len(frames):
+            return np.zeros((len(self._at_commands), self.rollout.robot.dof))
+        own = _blend(frames, *self._commands)
+        return np.asarray((own @ (self._at_commands @ coefficients.T)[:, :, None])[:, :, 0])
+
+    def _functions_at(self, t: Array) -> Array:
         """Return φ at times `t` (M,), (M, K)."""
         return self._null_motion.functions(np.minimum(t, self._duration), self._duration)
 
@@ -322,7 +337,7 @@ class Horizon:
         self._frames[0] = first[0]
         free = self._coefficients @ self._rest
         self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
-        stages = self._blend(self._node, self._share)
+        stages = _blend(self._frames, *self._stages)
         outer = stages @ (self._functions @ self._coefficients.T)[:, :, None]
         if not self._run(q, outer[:, :, 0]):
             return False
@@ -401,10 +416,6 @@ class Horizon:
         node = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, self.grid.steps - 1)
         share = np.minimum((t - nodes[node]) / (nodes[node + 1] - nodes[node]), 1.0)
         return np.asarray(node), share[:, None, None]
-
-    def _blend(self, node: Array, share: Array) -> Array:
-        frames = self._frames
-        return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
 
     def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, float] | None:
         """Return the step of the coefficients (d,), and by how much the cost is to fall.

@@ -66,6 +66,8 @@ def sampled(path: Path, times: Times) -> Sampled:
         inner = sampled(path.carried, times)
         return Sampled(path.moved(inner.path), inner.along)
     found = resting(path, times.s)
+    if times.s is times.t:
+        return Sampled(found, found.twist)
     twist = times.rate[:, None] * found.twist
     return Sampled(PathSamples(times.t, found.translation, found.rotation, twist), found.twist)
 
@@ -180,6 +182,7 @@ class Pace:
         squares = integrals.T @ integrals + SMOOTH * horizon**2 * hats.T @ hats
         self._mass = squares * (fine[1] - fine[0]) / horizon**2
         _, self._at_knots = self.weights(self.knots)
+        self._even = [1.0] * len(self.knots)
         self.reset()
 
     def reset(self) -> None:
@@ -194,7 +197,7 @@ class Pace:
     @property
     def is_on_time(self) -> bool:
         """Whether the path is followed by the clock."""
-        return self.delay == 0.0 and bool(np.all(self.rates == 1.0))
+        return self.delay == 0.0 and self.rates.tolist() == self._even
 
     def weights(self, t: Array) -> tuple[Array, Array]:
         """Return the weights of rates in the rate, and in its integral, at times, (K, J + 1)."""
@@ -217,7 +220,7 @@ class Pace:
 
     def shift(self, seconds: float) -> None:
         """Let time pass."""
-        if seconds <= 0.0 or (self.is_on_time and np.all(self._commanded == 1.0)):
+        if seconds <= 0.0 or (self.is_on_time and self._commanded.tolist() == self._even):
             return
         hats, progress = self.weights(np.array([seconds]))
         self.delay += seconds - float(progress[0] @ self._commanded)

@@ -161,6 +161,8 @@ class Replanner:
         )
         fastest = np.stack([limits[2], limits[3], jerk * limits[3]])
         self._quantities = Quantities(robot, others, fastest, self.cycle) if others else None
+        self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
+        self._ahead = self.cycle * np.arange(1.5, self._cycles + 1.0)
         self._horizon = Horizon(
             follows,
             costs,
@@ -168,11 +170,11 @@ class Replanner:
             null_motion,
             self.horizon,
             steps,
+            self._ahead,
             self._around,
             self._quantities,
         )
         self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
-        self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
         gentler = self._quantities is not None and self._quantities.by_acceleration
         self._commands = Commands(
             robot,
@@ -195,13 +197,11 @@ class Replanner:
 
     def _prepare(self) -> None:
         """Make all tables of a step, for the cycles that follow the path."""
-        n, h, grid, cycles = self.robot.dof, self.cycle, self._horizon.grid, self._cycles
+        n, grid, cycles = self.robot.dof, self._horizon.grid, self._cycles
         self._table = np.zeros((cycles, 2 * n + law.REFERENCE))
-        ahead = h * np.arange(1.5, cycles + 1.0)
         halves = np.interp(np.arange(2 * grid.steps + 1), 2 * np.arange(grid.steps + 1), grid.nodes)
-        self._ahead, self._times = ahead, np.concatenate([halves, ahead])
+        self._times = np.concatenate([halves, self._ahead])
         self._pace, self._paced = self._horizon.pace, self._horizon.pace.weights(self._times)
-        self._functions = self._horizon.functions(ahead)
         # Stages of the Runge-Kutta method among nodes and middles.
         stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
         self._stages = np.append(stages.ravel(), 2 * grid.steps)
@@ -525,7 +525,7 @@ class Replanner:
         rate, place = commands.rate, commands.place
         twist = None if target.along.any() else self._last_reference_twist(passed)
         horizon.shift(passed)
-        epsilon = horizon.epsilon(self._ahead, self._functions)
+        before = horizon.plan
         for retreats in range(RETREATS + 1):
             self._pace.command()
             error = self._reference.begin(place, rate, target.path, twist)
@@ -539,9 +539,8 @@ class Replanner:
             target = self._path.again(self._when()) or target
         if self._pace.is_on_time and not (failure or horizon.damped < np.inf):
             self._clear = place
-        flag = Flag.PLANNED
+        flag, epsilon = Flag.PLANNED, horizon.epsilon(before if failure else horizon.plan)
         if not failure:
-            epsilon = horizon.epsilon(self._ahead, self._functions)
             if self._pace.rates[0] < STANDING and self._pace.delay > RIGHT_AHEAD:
                 reasons.append("the tool waits on its path")
             if horizon.elastic:
