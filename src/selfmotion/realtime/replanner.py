@@ -47,9 +47,11 @@ from selfmotion.realtime.reference import Approach, Reference
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.settings import (
     AHEAD,
+    CATCH_UP,
     GENTLER,
     GENTLEST,
     HARDER,
+    JUMPED,
     LARGEST,
     LONGEST_STOP,
     REACHED,
@@ -441,7 +443,7 @@ class Replanner:
             pace.reset()
             return found
         if self._held and found.along[0].any():
-            self._anchor(found)
+            self._anchor(found, waited)
             found = self._path.again(self._when())
         if self._is_met_again():
             pace.reset()
@@ -454,18 +456,19 @@ class Replanner:
         t = commands.time + commands.lead + self._times
         return self._pace.times(t, self._times, self._paced)
 
-    def _anchor(self, target: Sampled) -> None:
-        """Let the path go on where the tool is, which was stopped or held back."""
+    def _anchor(self, target: Sampled, passed: float) -> None:
+        """Let the path go on where the tool is, which was stopped or held back meanwhile."""
         commands, task = self._commands, self.task
         jacobian = self._kinematics.at(commands.place)
         here = SE3(self._kinematics.rotation, self._kinematics.translation)
         goal = SE3(target.path.rotation[0], target.path.translation[0])
         each = target.along[0], -task.twist_error(goal, here), jacobian @ commands.rate
         along, ahead, rate = (task.select(one[:, None], here.rotation)[:, 0] for one in each)
-        size, most = float(along @ along), self._patience
-        off = max(np.abs(ahead).max(), np.abs(rate - self._pace.rates[0] * along).max())
-        # So little is left to the approach, as where the path begins at rest.
-        if size > 0.0 and off > UNNOTICED:
+        size, off = float(along @ along), np.abs(ahead).max()
+        differs = max(off, np.abs(rate - self._pace.rates[0] * along).max()) > UNNOTICED
+        # Far from its path the tool approaches it, and a path that begins at rest is left to that.
+        if size > 0.0 and differs and off < JUMPED:
+            most = (1.0 + CATCH_UP) * passed
             early = min(max(float(along @ ahead) / size, -most), most)
             self._pace.anchor(early, float(along @ rate) / size)
 
