@@ -241,7 +241,7 @@ class Pace:
         self.rates = self.rates * np.clip(1.0 - self.knots / max(when, 1e-9), 0.0, 1.0)
 
     def slow_down(self, times: int) -> None:
-        """Take all rates but the present one back, the more the more often it was in vain."""
+        """Take all rates but the present one back, by so much more as it did not help before."""
         self.rates[1:] *= SLOWER**times
 
     @property
