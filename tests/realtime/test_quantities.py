@@ -38,7 +38,9 @@ def test_the_judges_of_segments_reject_what_is_broken(kind: str) -> None:
 def test_the_proof_alone_stops_the_arm(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Plans that see no quantity: with the proof no segment breaks a limit."""
 
-    def none(self: Quantities, samples: object, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
+    def none(
+        self: Quantities, samples: object, by_q: Array, by_qd: Array, own: int
+    ) -> tuple[Array, Array]:
         return np.zeros((0, by_q.shape[2])), np.zeros(0)
 
     monkeypatch.setattr(Quantities, "rows", none)

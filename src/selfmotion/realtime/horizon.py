@@ -51,6 +51,8 @@ def elastic_step(
     numpy.linalg.LinAlgError
         The numbers are too large for a solution.
     """
+    if not len(gradient):
+        return gradient, bool(((low > 0.0) | (high < 0.0)).any())
     reach = np.full(len(gradient), REACH)
     chosen = np.zeros(len(rows), dtype=bool)
     step = np.asarray(np.linalg.solve(metric, -gradient), dtype=np.float64)
@@ -104,6 +106,8 @@ def model_of(
     others, `guess` is a multiple of that of joint speed. Tangents are (S, n, d).
     """
     d, sampling = by_q.shape[-1], samples.sampling
+    if not d:
+        return np.zeros(0), np.zeros((0, 0))
     weights = samples.weights[:, None]
     nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
     flat = {0: by_q.reshape(-1, d), 1: by_qd.reshape(-1, d)}
@@ -329,7 +333,7 @@ class Horizon:
     def _improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
         self.rollout.aim(reference)
         if not self.redundancy:
-            return self._run(q, np.zeros((len(self._functions), len(q))))
+            return self._run(q, np.zeros((len(self._functions), len(q)))) and self._paced_alone()
         if not len(self._frames) and not self._begin(q):
             return False
         first = np.empty((1, *self._frames.shape[1:]))
@@ -359,6 +363,13 @@ class Horizon:
             self._coefficients = better
         transport(first[0], here, PIVOT, self._frames)
         return True
+
+    def _paced_alone(self) -> bool:
+        """Adapt the pace of an arm without self-motion; return whether numbers are finite."""
+        samples = self.rollout.samples()
+        self.damped = self._first_damped(samples)
+        none = np.zeros((*samples.q.shape, 0))
+        return self._step(samples, none, none) is not None
 
     def _first_damped(self, samples: Samples) -> float:
         """Return when the inverse of the task Jacobian is damped first, inf for never.
@@ -448,7 +459,7 @@ class Horizon:
         The cost is that of the self-motion, and no reason to be late.
         """
         d, pace = self.size, self.pace
-        slower, pull, limits = pace.programme(float(np.trace(metric)) / d)
+        slower, pull, limits = pace.programme(float(np.trace(metric)) / d if d else 1.0)
         more = len(pull)
         tangents = self._by_pace(samples)
         whole = (np.concatenate(pair, axis=2) for pair in zip((by_q, by_qd), tangents, strict=True))
@@ -494,7 +505,7 @@ class Horizon:
         if self._around is not None:
             below.append(self._around.rows(samples, by_q))
         if self._quantities is not None:
-            below.append(self._quantities.rows(samples, by_q, by_qd))
+            below.append(self._quantities.rows(samples, by_q, by_qd, self.size))
         if not below:
             return rows, low, high
         room = np.concatenate([each for _, each in below])
@@ -508,7 +519,7 @@ class Horizon:
         qd, moves = samples.qd[nodes], by_qd[nodes]
         value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
         harder = np.diff(moves, axis=0) / pause[:, :, None]
-        rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
+        rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(value.size, d)
         slack = BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
 
@@ -520,4 +531,4 @@ class Horizon:
         above, below = curves.slopes(qd)
         rows = np.stack([at + above[..., None] * moves, -at + below[..., None] * moves])
         room = -curves.excess(samples.q[nodes][:, some], qd)
-        return rows.reshape(-1, by_q.shape[2]), room.ravel()
+        return rows.reshape(room.size, by_q.shape[2]), room.ravel()

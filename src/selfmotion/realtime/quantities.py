@@ -12,7 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import MotionSegments, Quantity, Shares
 from selfmotion.model.motion import Sampling
 from selfmotion.model.robot import ChainSeries, RobotModel
-from selfmotion.problem.constraints import Constraint, NodeTangents, linearised
+from selfmotion.problem.constraints import BoundQuantity, Constraint, NodeTangents, linearised
 from selfmotion.problem.costs import PlacedLater, Samples
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.settings import (
@@ -71,7 +71,14 @@ class Quantities:
         self._robot = robot
         self._near: _NearTimes | None = None
         points = [at for item in constraints for at in item.conditions(robot).points]
-        self._conditions = [(at, at.uses_accelerations(robot.dof)) for at in points]
+        self._conditions = [
+            (
+                at,
+                at.uses_accelerations(robot.dof),
+                isinstance(at, BoundQuantity) and at.quantity.of_pace,
+            )
+            for at in points
+        ]
         anywhere = _Groups(robot, cycle, fastest[..., None], np.full((3, 1, robot.dof), np.nan))
         self._proofs = [_Proof(item.quantity(robot), anywhere) for item in constraints]
         self.by_acceleration = any(proof.by_acceleration for proof in self._proofs)
@@ -81,10 +88,11 @@ class Quantities:
         for proof in self._proofs:
             proof.forget()
 
-    def rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
+    def rows(self, samples: Samples, by_q: Array, by_qd: Array, own: int) -> tuple[Array, Array]:
         """Return the constraints of a step of the plan: rows (R, d) and upper limits (R,).
 
-        Those near their limits that the plan can change. What is exceeded now is to be left.
+        Those near their limits. The first `own` of the variables are those of the self-motion. What
+        is exceeded now is to be left.
         """
         near = self._near or _NearTimes(samples.sampling)
         self._near, nodes, later = near, samples.nodes, near.later
@@ -92,7 +100,7 @@ class Quantities:
         between = PlacedLater(samples.follows, near.sampling, q=q, qd=qd)
         motion = NodeTangents(*near.motion(by_q[nodes], by_qd[nodes]), near.sampling)
         rows, room = [np.zeros((0, motion.size))], [np.zeros(0)]
-        for item, accelerated in self._conditions:
+        for item, accelerated, of_pace in self._conditions:
             h = item.residual(between)
             reserve = ACCELERATED_RESERVE if accelerated else QUANTITY_RESERVE
             # Accelerations may be others at once.
@@ -102,10 +110,13 @@ class Quantities:
             left[0] = np.inf
             which = np.flatnonzero(left < NEAR_LIMIT)
             if which.size:
-                own = linearised(item, between, motion).picked(motion, which)
-                moved = np.abs(own).max(axis=1) > UNMOVED
-                rows.append(own[moved])
-                room.append(left.ravel()[which[moved]])
+                by = linearised(item, between, motion).picked(motion, which)
+                still = np.abs(by[:, :own]).max(axis=1, initial=0.0) < UNMOVED
+                # What the path alone says, at any pace, may use the reserve.
+                some = left.ravel()[which] + reserve * (still & (not of_pace))
+                kept = ~still | (some < 0.0) | by.any(axis=1)
+                rows.append(by[kept])
+                room.append(some[kept])
         return np.concatenate(rows), np.concatenate(room)
 
     def unproved(self, segment: Segment, deviation: Array) -> Unproved | None:
@@ -155,8 +166,9 @@ class _NearTimes:
 
     def motion(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Return a motion at the times of one at the nodes (N + 1, …), or tangents likewise."""
-        ends = np.concatenate([q, qd]).reshape(2 * len(q), -1)
-        values, rates = ((matrix @ ends).reshape(-1, *q.shape[1:]) for matrix in self._matrices)
+        ends = np.concatenate([q, qd]).reshape(2 * len(q), q[0].size)
+        shape = len(self.later), *q.shape[1:]
+        values, rates = ((matrix @ ends).reshape(shape) for matrix in self._matrices)
         return values, rates
 
 

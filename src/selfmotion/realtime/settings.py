@@ -120,7 +120,7 @@ ACCELERATED_RESERVE = 0.1
 # Rows with more room than this share of their limit are left out of a step.
 NEAR_LIMIT = 0.5
 # Rows that no self-motion changes have no larger entry [shares of the limit].
-UNMOVED = 1e-9
+UNMOVED = 1e-4
 # Time in which plans leave what is exceeded [s].
 LEAVING_IN = 0.5
 # Share of a limit that is kept for bounds: of what is beside it, all segments together use it once.
