@@ -8,7 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.realtime import Conveyed, Flag, MovingPose, Replanner, Segment
 from selfmotion.realtime.pace import Pace, Times, sampled
 from selfmotion.realtime.settings import CATCH_UP
-from support.arms import PANDA_HOME
+from support.arms import PANDA_HOME, robot_named
 from support.loops import closed_loop
 from support.realtime_bodies import ROUNDED, limits_exceeded
 
@@ -72,6 +72,22 @@ def test_a_path_that_begins_at_full_speed_is_followed_from_rest(panda: sm.RobotM
     assert off[:180].max() < ON_PATH
     assert 0.0 < delay.max() < 0.5
     assert delay[-1] == 0.0
+
+
+def test_an_arm_without_self_motion_is_late_as_well() -> None:
+    robot = robot_named("ur5")
+    start = robot.dexterous_configuration()
+    path = sm.paths.Circle.around(robot.pose(start), 0.1, 2.0, normal=(1.0, 0.0, 0.0))
+    limits = [sm.constraints.JointVelocityLimits(0.3), sm.constraints.JointAccelerationLimits(5.0)]
+    replanner = Replanner(robot, "pose", constraints=limits)
+    segments, places = closed_loop(replanner, path, start, 5.0)
+    off = [
+        replanner.task.miss(path.pose(min(max(one.t[0] - one.delay, 0.0), 2.0)), robot.pose(q))[0]
+        for one, q in zip(segments[1:], places[:-1], strict=True)
+    ]
+    assert max(off) < 2.0 * ON_PATH
+    assert max(segment.delay for segment in segments) > 0.5
+    assert segments[-1].delay == 0.0
 
 
 class Out(sm.paths.Path):
