@@ -1,4 +1,4 @@
-"""Random scenarios for the loop: pushes, late steps, jumps of the target and faults.
+"""Random scenarios for the loop: pushes, late steps, jumps of the target, faults; quantities.
 
 With `--far` it looks 8 s ahead instead of 2 s.
 """
@@ -14,10 +14,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
 from selfmotion.realtime import Replanner
-from support import realtime_bodies as bodies, realtime_scenarios as scenarios
+from support import (
+    realtime_bodies as bodies,
+    realtime_quantities as quantities,
+    realtime_scenarios as scenarios,
+)
 
-# One scenario in this number has a ball that jumps about the tool's way.
+# One scenario in this number has a ball that jumps about the tool's way, the one before it
+# quantities: torques, a tilt, an elbow, the tool's limits, each alone and all together.
 EVERY = 5
+KINDS = [*((kind,) for kind in quantities.KINDS), tuple(quantities.KINDS)]
 TASKS = ("pose", "position", "pointing")
 FAR = {"horizon": 8.0, "null_motion": sm.motion.BSplineNullMotion(6), "steps": 24}
 
@@ -33,10 +39,18 @@ def among_bodies():
     return bodies.looped()
 
 
+@cache
+def with_quantities(kinds):
+    return quantities.looped(*kinds)
+
+
 def judged(seed, far):
-    """Return what the scenario of a seed showed; every fifth is among bodies."""
+    """Return what the scenario of a seed showed; two of five are among bodies, or of quantities."""
     if seed % EVERY == EVERY - 1:
         return scenarios.Outcome(seed, bodies.faults(seed, among_bodies()))
+    if seed % EVERY == EVERY - 2:
+        kinds = KINDS[seed // EVERY % len(KINDS)]
+        return scenarios.Outcome(seed, quantities.faults(seed, kinds, with_quantities(kinds)))
     task = TASKS[seed % len(TASKS)]
     return scenarios.run(seed, task, *loop(task, far))
 

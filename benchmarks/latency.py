@@ -28,6 +28,12 @@ def obstacle(robot):
     return sm.constraints.Clearance([away], distance=0.02)
 
 
+def others():
+    """Return a clearance of the arm from itself, a band and limits of torques."""
+    kinds = sm.constraints
+    return kinds.Clearance(distance=0.0), kinds.Band.of_elbow("up", 0.3), kinds.JointTorqueLimits()
+
+
 class Bare:
     """The Pinocchio calls of one step, and nothing else."""
 
@@ -99,6 +105,9 @@ def latencies(robot, steps):
         ),
         "pose, ball that moves": dict(task="pose", constraints=[obstacle(robot)]),
         "position, ball that moves": dict(task="position", constraints=[obstacle(robot)]),
+        "position, two clearances, elbow, torques": dict(
+            task="position", constraints=[obstacle(robot), *others()]
+        ),
     }
     print("| steps of | p50 / p99 / p99.9 / worst [ms] | processor time | × bare calls (p50, p99) |"
           " over 1, 2, 5, 10 ms |")  # fmt: skip

@@ -206,8 +206,8 @@ def test_a_file_without_constraints_is_followed_within_the_makers_limits(tmp_pat
     np.testing.assert_array_equal(replanner.jerk_limit, panda.jerk_limit)
     file.write_text(text + '[[constraints]]\nkind = "JointJerkLimits"\nlimit = 2000\n')
     assert np.all(replanner_of(sm.read_problem(file)).jerk_limit == 2000.0)
-    file.write_text(text + '[[constraints]]\nkind = "ToolLimits"\nspeed = 0.2\n')
-    assert "constraint ToolLimits is not kept while moving" in complaint("follow", file)
+    file.write_text(text + '[[constraints]]\nkind = "ClosedPath"\n')
+    assert "constraint ClosedPath is not kept while moving" in complaint("follow", file)
 
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:

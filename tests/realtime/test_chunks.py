@@ -197,7 +197,7 @@ def test_a_chunk_after_a_stop_is_followed_again() -> None:
     panda = robot_named("panda")
     replanner = Replanner(panda)
     loop(replanner, 2.5, until=0.5)
-    t, q = 2.5, replanner._commands.segment(0, Flag.STOPPING, (), True, np.zeros(2)).q[0]
+    t, q = 2.5, replanner._commands.segment(0, Flag.STOPPING, (), True, np.zeros(2), 0.0).q[0]
     for k in range(100):
         times, poses = 2.5 + np.array([0.0, 2.0]), [pose_at(1.2), pose_at(1.4)]
         given = {"chunk": poses, "times": times} if k == 0 else {}

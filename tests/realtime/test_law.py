@@ -133,7 +133,7 @@ def test_a_stop_from_any_viable_state_stays_within_limits() -> None:
         states = np.zeros((4000, 3, 7))
         states[: cycles + 1] = commanded(rng, cycles, limits, h)
         inner = np.vstack([tightened(limits), np.zeros(7)])
-        end = law.brake(states, cycles, inner, h)
+        end = law.brake(states, cycles, inner, 1.0, h)
         assert end < len(states) - 1
         assert np.all(states[end, 1:] == 0.0)
         assert beyond(limits, states[: end + 1]) <= 0.0

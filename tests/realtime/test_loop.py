@@ -15,6 +15,7 @@ from selfmotion.realtime.warm import Compiled
 from support import realtime_scenarios as scenarios
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
+from support.realtime_quantities import KINDS, looped
 
 
 def test_the_loop_reads_until_there_is_no_state(
@@ -77,10 +78,11 @@ def test_a_simulated_arm_wants_a_segment() -> None:
 # Around the loop.
 
 
+@pytest.mark.parametrize("kinds", [(), tuple(KINDS)])
 def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
-    panda: sm.RobotModel, slow_circle: sm.paths.Circle
+    kinds: tuple[str, ...], slow_circle: sm.paths.Circle
 ) -> None:
-    replanner = Replanner(panda, "position")
+    replanner = looped(*kinds)
     realtime.warm_up(replanner)
     listener = Compiled()
     with event.install_listener("numba:compile", listener):

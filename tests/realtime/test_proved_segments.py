@@ -69,6 +69,21 @@ def test_the_proof_alone_stops_the_arm(monkeypatch: pytest.MonkeyPatch, *, is_pr
     assert worst <= 0.0 if is_proved else worst > 0.0
 
 
+def test_of_several_clearances_each_has_its_own_distance(panda: sm.RobotModel) -> None:
+    """And each pair of links is looked at once, with the largest."""
+    far, beside = (sm.obstacles.Sphere(name, np.zeros(3), 0.05) for name in ("far", "beside"))
+    models = [sm.obstacles.CollisionModel(panda, [ball]) for ball in (far, beside)]
+    around = Surroundings(panda, [(models[0], 0.1), (models[1], 0.02)])
+    pairs = [(set(pair), proof.far) for proof in around._proofs for pair in proof.pairs]
+    assert {distance for pair, distance in pairs if "far" in pair} == {0.1}
+    assert {distance for pair, distance in pairs if "beside" in pair} == {0.02}
+    links = [(frozenset(pair), d) for pair, d in pairs if not pair & {"far", "beside"}]
+    assert links
+    assert {distance for _, distance in links} == {0.1}
+    # Of a link with several bodies a pair of names appears repeatedly, in one model alone.
+    assert len(links) == sum(not {"far", "beside"} & set(pair) for pair in models[0].pairs)
+
+
 def test_path_lengths_are_bounds() -> None:
     segment = run(looped(), 1, 12)[-1][0]
     dense = between_cycles(segment)

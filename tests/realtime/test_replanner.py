@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.realtime import Flag, Replanner
+from selfmotion.realtime.quantities import is_quantity
 from support import realtime_scenarios as scenarios
 from support.arms import PANDA_HOME
 from support.followed import standing
@@ -253,17 +254,6 @@ def test_a_first_state_in_degrees_is_asked_about(
         assert ("in degrees?" in str(caught.value)) is asked
 
 
-def test_a_quantity_that_claims_to_be_kept_is_refused(panda: sm.RobotModel) -> None:
-    """Else it would be left out in silence."""
-
-    class Claimed(sm.constraints.Band):
-        kept_moving = True
-
-    band = Claimed(sm.robot.JointCoordinate("panda_joint2"), 0.0, 1.0)
-    with pytest.raises(sm.errors.ProblemError, match="Claimed says that it is kept while moving"):
-        Replanner(panda, constraints=[band])
-
-
 @pytest.mark.parametrize("name", sm.constraints.__all__)
 def test_each_constraint_is_kept_or_refused_by_name(panda: sm.RobotModel, name: str) -> None:
     """None is left out in silence: of all that a problem may have."""
@@ -284,7 +274,7 @@ def test_each_constraint_is_kept_or_refused_by_name(panda: sm.RobotModel, name: 
     if kind is sm.constraints.Constraint:
         return
     item = asked.get(name, lambda kind: kind())(kind)
-    if item.kept_moving:
+    if item.kept_moving or is_quantity(item):
         assert Replanner(panda, constraints=[item]).limits.shape == (4, 7)
         return
     with pytest.raises(sm.errors.ProblemError, match=f"{name} is not kept while moving"):

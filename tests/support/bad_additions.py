@@ -380,7 +380,7 @@ def _planning_rows() -> list[Row]:
 def _replanner_rows() -> list[Row]:
     area, arm = "While the arm moves", robot_named("panda")
     others = {"1": 1, "'fast'": "fast", "None": None}
-    asked = {"[ToolLimits]": [sm.constraints.ToolLimits(speed=1.0)], "[1]": [1], **others}
+    asked = {"[ClosedPath]": [sm.constraints.ClosedPath()], "[1]": [1], **others}
     state = {"None": None, "'home'": "home", "of six joints": PANDA_HOME[:6], "NaN": [NAN] * 7}
 
     def stepped(**given: Any) -> object:

@@ -23,14 +23,22 @@ ROUNDING = 1e-6
 ROUNDED, SAME = 1e-9, 1e-12
 
 
-def between_cycles(segment: Segment) -> Array:
-    """Return q at four times per cycle, (K, n): the acceleration is linear between commands."""
+def motion_between_cycles(segment: Segment) -> tuple[Array, Array, Array]:
+    """Return q, q̇ and q̈ at four times per cycle, (K, n): q̈ is linear between commands."""
     h = float(segment.t[1] - segment.t[0])
     times = h * np.arange(PER_CYCLE)[:, None, None] / PER_CYCLE
     slope = np.diff(segment.qdd, axis=0) / h
     q, qd, qdd = segment.q[:-1], segment.qd[:-1], segment.qdd[:-1]
     places = q + times * (qd + times * (0.5 * qdd + times / 6.0 * slope))
-    return np.asarray(places.transpose(1, 0, 2).reshape(-1, q.shape[1]))
+    rates = qd + times * (qdd + 0.5 * times * slope)
+    n = q.shape[1]
+    q, qd, qdd = (x.transpose(1, 0, 2).reshape(-1, n) for x in (places, rates, qdd + times * slope))
+    return q, qd, qdd
+
+
+def between_cycles(segment: Segment) -> Array:
+    """Return q at four times per cycle, (K, n)."""
+    return motion_between_cycles(segment)[0]
 
 
 def nearer_than_allowed(robot: sm.RobotModel, bodies: list, q: Array) -> float:

@@ -1,7 +1,6 @@
 """Motions planned while the arm moves: the next seconds, again and again."""
 
 from selfmotion.realtime.chunks import Blended as Blended, Chunk as Chunk
-from selfmotion.realtime.commands import Flag as Flag, Segment as Segment
 from selfmotion.realtime.loop import State as State, follow as follow, warm_up as warm_up
 from selfmotion.realtime.reference import (
     Approach as Approach,
@@ -9,5 +8,6 @@ from selfmotion.realtime.reference import (
     MovingPose as MovingPose,
 )
 from selfmotion.realtime.replanner import Replanner as Replanner
+from selfmotion.realtime.segment import Flag as Flag, Segment as Segment
 from selfmotion.realtime.simulated_arm import Plant as Plant, SimulatedArm as SimulatedArm
 from selfmotion.realtime.simulation import Record as Record, Scene as Scene, track as track

@@ -43,11 +43,10 @@ class Surroundings:
     """
 
     def __init__(self, robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]) -> None:
-        # Own models: those of the certificate have fixed obstacles.
-        exact = [CollisionModel(robot, own.obstacles, own.disabled) for own, _ in bodies]
+        exact, distances = _each_once(robot, bodies)
         self._models = [
             (ClearanceModel(own, far + LEVEL), far)
-            for own, (_, far) in zip(exact, bodies, strict=True)
+            for own, far in zip(exact, distances, strict=True)
         ]
         self._names = [{item.name for item in own.obstacles} for own in exact]
         self._standing = [own.standing for own in exact]
@@ -190,6 +189,25 @@ class Surroundings:
                     f"until {times[row]:.3f} s: they {how_near(near, digits=1)} there"
                 )
         return ""
+
+
+def _each_once(
+    robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]
+) -> tuple[list[CollisionModel], list[float]]:
+    """Return own models, as those of the certificate have fixed obstacles, and distances.
+
+    Of several clearances each pair of links is in the one with the largest distance.
+    """
+    models, distances = list[CollisionModel](), list[float]()
+    known: dict[tuple[str, str], None] = {}
+    for given, far in sorted(bodies, key=lambda each: -each[1]):
+        own = CollisionModel(robot, given.obstacles, [*given.disabled, *known])
+        if own.pairs or not models:
+            models.append(own)
+            distances.append(far)
+        obstacles = {item.name for item in given.obstacles}
+        known.update((pair, None) for pair in own.pairs if obstacles.isdisjoint(pair))
+    return models, distances
 
 
 class _Proof:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import Enum
 from functools import reduce
 from operator import and_
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, StartError, read_only
+from selfmotion.basics import Array, ProblemError, StartError
 from selfmotion.basics.layout import Layout
 from selfmotion.model.robot import Kinematics, RobotModel
 from selfmotion.problem.constraints import (
     Constraint,
+    Ends,
     Envelope,
     JointAccelerationLimits,
     JointJerkLimits,
@@ -25,6 +23,8 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.realtime import law
 from selfmotion.realtime.law import braking_distance, tightened
+from selfmotion.realtime.quantities import is_quantity
+from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.settings import (
     ACCELERATION,
     ENDS,
@@ -56,17 +56,15 @@ def kept_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envel
         A constraint is of a kind that cannot be kept while moving.
     """
     for item in constraints:
-        if not item.kept_moving:
-            raise ProblemError(
-                f"constraint {type(item).__name__} is not kept while moving, expected limits of "
-                f"joint position, velocity, acceleration and jerk, or a Clearance"
+        if not (item.kept_moving or is_quantity(item)):
+            about = (
+                "is about the ends of a motion, which goes on"
+                if item.ends != Ends()
+                else "says by neither a quantity nor its envelope what it limits"
             )
-        unkept = [quantity.name for quantity in item.envelope(robot).quantities]
-        if unkept:
             raise ProblemError(
-                f"constraint {type(item).__name__} says that it is kept while moving, but its "
-                f"envelope has the quantity '{unkept[0]}', which the loop does not keep; expected "
-                f"kept_moving = False"
+                f"constraint {type(item).__name__} is not kept while moving: it {about}; expected "
+                f"limits of joints or of a quantity, or a Clearance"
             )
     kinds = {type(item) for item in constraints}
     # Without given ones, those of the arm and its maker.
@@ -184,85 +182,6 @@ def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: floa
     return np.asarray(c)
 
 
-class Flag(Enum):
-    """How a segment follows the path, from the best to the last resort."""
-
-    PLANNED = "planned"
-    KEPT = "kept"
-    TRACKING = "tracking"
-    STOPPING = "stopping"
-
-    @property
-    def message(self) -> str:
-        """Its meaning."""
-        return _MESSAGES[self]
-
-
-_MESSAGES = {
-    Flag.PLANNED: "planned from where the arm is",
-    Flag.KEPT: "the rest of the last plan",
-    Flag.TRACKING: "the tool is tracked without a plan of the self-motion",
-    Flag.STOPPING: "the arm is brought to rest",
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Segment:
-    """The commanded motion from a step on, one sample for each control cycle.
-
-    It goes on where the segment before is at its first sample, with the same position, velocity
-    and acceleration, and keeps the limits at all times. It covers more than one period: when the
-    next one is late, the rest of this one is commanded, which follows the path for a while and
-    then brings the arm to rest. At its end the arm rests.
-
-    Attributes
-    ----------
-    t : (M,)
-        Times [s].
-    q, qd, qdd : (M, n)
-        Positions, velocities and accelerations [rad or m, and per s, per s²].
-    flag : Flag
-        How it follows the path.
-    reasons : tuple of str
-        Causes of an unusual segment, and observations; empty for none.
-    follows : bool
-        Whether the tool moves as planned: not with joints at their limits.
-    tool_error : (2,)
-        Distance of the tool from the path at the segment's start, by the measured state [m, rad].
-    """
-
-    t: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    flag: Flag
-    reasons: tuple[str, ...]
-    follows: bool
-    tool_error: Array
-
-    def __post_init__(self) -> None:
-        for name in ("t", "q", "qd", "qdd", "tool_error"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-    @property
-    def travelled(self) -> Array:
-        """Upper bounds of the path lengths of joints from the first sample on, (K, n).
-
-        Between samples q̇ is quadratic, and nowhere larger than the largest of its control points
-        q̇, q̇ + ½ h q̈ and the next q̇.
-        """
-        h = float(self.t[1] - self.t[0])
-        before, after = self.qd[:-1], self.qd[1:]
-        fastest = np.max(np.abs([before, before + 0.5 * h * self.qdd[:-1], after]), axis=0)
-        return np.vstack([np.zeros(self.q.shape[1]), np.cumsum(h * fastest, axis=0)])
-
-    def index(self, t: npt.ArrayLike) -> int:
-        """Return the sample to command at a time [s]: the last one from the end on."""
-        step = self.t[1] - self.t[0]
-        last = len(self.t) - 1
-        return min(max(round((float(t) - float(self.t[0])) / float(step)), 0), last)  # type: ignore[arg-type]
-
-
 class Commands:
     """Commands of a segment, and the deviation of the arm from them.
 
@@ -286,6 +205,8 @@ class Commands:
         Time constant [s] of the filter of the arm's deviation from its command.
     mean : int
         Number M of cycles of the mean.
+    longest : float
+        Time that a stop may take where it need not be the hardest [s].
 
     Attributes
     ----------
@@ -304,12 +225,14 @@ class Commands:
         latency: float,
         settling: float,
         mean: int = 1,
+        longest: float = 0.0,
     ) -> None:
         self._robot, self._cycle, self._settling = robot, cycle, settling
         # The last row is the arm's deviation from its command.
         self._limits = np.vstack([tightened(limits), np.zeros(robot.dof)])
         # Number of cycles in which every joint stops from its highest speed.
         stopping = int(np.ceil((limits[2] / (limits[3] * cycle)).max())) + 3
+        stopping = max(stopping, round(longest / cycle))
         # c, w and a of each cycle; see `viable_accelerations`.
         self._states = np.zeros((cycles + stopping + mean, 3, robot.dof))
         # Those of the M - 1 cycles before.
@@ -328,7 +251,7 @@ class Commands:
         since = self._cycle * np.arange(len(self._past), 0, -1)[:, None]
         self._past[:, 0], self._past[:, 1], self._past[:, 2] = c - since * qd, qd, 0.0
         self._states[:, 0], self._states[0, 1] = c, qd
-        law.brake(self._states, 0, self._limits, self._cycle)
+        law.brake(self._states, 0, self._limits, 1.0, self._cycle)
         self.time, self._limits[law.DEVIATION], self._sent[:] = t, 0.0, q
 
     def go_on(self, t: float) -> float:
@@ -399,11 +322,18 @@ class Commands:
         return follows
 
     def segment(
-        self, first: int | None, flag: Flag, reasons: tuple[str, ...], follows: bool, error: Array
+        self,
+        first: int | None,
+        flag: Flag,
+        reasons: tuple[str, ...],
+        follows: bool,
+        error: Array,
+        delay: float,
+        share: float = 1.0,
     ) -> Segment:
         """Return the commands: from cycle `first` on, the arm is brought to rest.
 
-        None for the rest of the last segment.
+        By a share of the limits of acceleration. None for the rest of the last segment.
         """
         h = self._cycle
         if first is None:
@@ -411,10 +341,10 @@ class Commands:
             moves = np.flatnonzero(self._states[:, 1:].any(axis=(1, 2)))
             end = min(int(moves[-1]) + 1, len(self._states) - 1) if moves.size else 0
         else:
-            end = law.brake(self._states, first, self._limits, h)
+            end = law.brake(self._states, first, self._limits, share, h)
         # After the end the arm rests.
         self._states[end + 1 :] = self._states[end]
-        end = max(end + len(self._past), 1)
+        end = max(min(end + len(self._past), len(self._states) - 1), 1)
         q, qd, qdd = np.moveaxis(self._commanded(end), 1, 0)
         return Segment(
             t=np.asarray(self.time + h * np.arange(end + 1), dtype=np.float64),
@@ -425,6 +355,7 @@ class Commands:
             reasons=reasons,
             follows=follows,
             tool_error=error,
+            delay=delay,
         )
 
     def _commanded(self, end: int) -> Array:

@@ -1,6 +1,7 @@
 """The self-motion over the next seconds: one step of its quadratic programme for each cycle."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION
+from selfmotion.realtime.pace import Pace
+from selfmotion.realtime.quantities import Quantities
 from selfmotion.realtime.settings import (
     BADLY,
     BREAKING,
@@ -48,6 +51,8 @@ def elastic_step(
     numpy.linalg.LinAlgError
         The numbers are too large for a solution.
     """
+    if not len(gradient):
+        return gradient, bool(((low > 0.0) | (high < 0.0)).any())
     reach = np.full(len(gradient), REACH)
     chosen = np.zeros(len(rows), dtype=bool)
     step = np.asarray(np.linalg.solve(metric, -gradient), dtype=np.float64)
@@ -101,6 +106,8 @@ def model_of(
     others, `guess` is a multiple of that of joint speed. Tangents are (S, n, d).
     """
     d, sampling = by_q.shape[-1], samples.sampling
+    if not d:
+        return np.zeros(0), np.zeros((0, 0))
     weights = samples.weights[:, None]
     nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
     flat = {0: by_q.reshape(-1, d), 1: by_qd.reshape(-1, d)}
@@ -122,6 +129,20 @@ def model_of(
         heavy = weights[:, :, None] * (weight @ one.reshape(*samples.q.shape, d))
         metric += one.T @ heavy.reshape(-1, d)
     return gradient, metric
+
+
+def is_damped(gram: Array) -> Any:
+    """Return whether commands damp the inverse of JJᵀ (…, m, m), by its smallest pivot."""
+    try:
+        factor = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return np.ones(gram.shape[:-2], dtype=bool)
+    return (np.diagonal(factor, axis1=-2, axis2=-1) ** 2 < PIVOT).any(axis=-1)
+
+
+def _blend(frames: Array, node: Array, share: Array) -> Array:
+    """Return frames between nodes, by a share of the way to the next one."""
+    return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
 
 
 def graded(duration: float, steps: int) -> Array:
@@ -161,15 +182,23 @@ class Horizon:
         How far ahead it plans [s].
     steps : int
         Runge-Kutta steps.
+    commands : (M,)
+        Times from now on at which ε is commanded [s].
     surroundings : Surroundings, optional
         Collision constraints.
+    quantities : Quantities, optional
+        Other constraints.
 
     Attributes
     ----------
+    pace : Pace
+        At what rate the path is followed.
     elastic : bool
         Whether the last step could not keep all limits and distances.
     breakdown : float
         When the last motion ran into a singular pose [s]; inf where it did not.
+    damped : float
+        When it came so near one that commands would leave a path there [s]; likewise.
     """
 
     def __init__(
@@ -180,7 +209,9 @@ class Horizon:
         null_motion: NullMotion,
         duration: float,
         steps: int,
+        commands: Array,
         surroundings: Surroundings | None = None,
+        quantities: Quantities | None = None,
     ) -> None:
         self.grid = Grid(graded(duration, steps))
         robot = follows.robot
@@ -188,13 +219,18 @@ class Horizon:
         self.redundancy = follows.redundancy
         self._costs, self._duration = tuple(costs), duration
         self._null_motion, self._around = null_motion, surroundings
+        self._quantities = quantities
+        self.pace = Pace(duration, self.grid.nodes)
+        # Made once.
+        self.grid.sampling.node_differentiation(1)
+        self._along = np.zeros((0, 6))
         t = self.grid.stage_times
         self._functions = null_motion.functions(t, duration)
         self._inverse = np.linalg.pinv(self._functions)
         now = self._functions[0]
         self._first = now / (now @ now)
         self._rest = null_space(now[None])
-        self._shifts: dict[float, Array] = {}
+        self._shifts: dict[float, tuple[Array, tuple[Array, Array]]] = {}
         self._metrics = [item for cost in costs for item in cost.curvature(robot.dof).items()]
         # Costs whose curvature is not known.
         self._guesses = any(not cost.curvature(robot.dof) for cost in costs)
@@ -209,7 +245,8 @@ class Horizon:
         self._wild = WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
-        self._node, self._share = self._between(t)
+        self._stages = self._between(t)
+        self._commands, self._at_commands = self._between(commands), self._functions_at(commands)
         self.forget()
 
     def forget(self) -> None:
@@ -218,7 +255,14 @@ class Horizon:
         self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
         self._damping = 1.0
-        self.elastic, self.breakdown = False, np.inf
+        self.elastic = False
+        self.breakdown = self.damped = float(np.inf)
+
+    def start_anew(self) -> None:
+        """Restart after a failure, which is still told."""
+        when = self.breakdown
+        self.forget()
+        self.breakdown = when
 
     @property
     def size(self) -> int:
@@ -238,25 +282,33 @@ class Horizon:
             return
         if seconds not in self._shifts:
             self._shifts.clear()
-            later = np.minimum(self.grid.stage_times + seconds, self._duration)
-            moved = self._null_motion.functions(later, self._duration)
-            self._shifts[seconds] = (self._inverse @ moved).T
-        self._coefficients = self._coefficients @ self._shifts[seconds]
-        self._frames = self._blend(*self._between(self.grid.nodes + seconds))
+            moved = self._functions_at(self.grid.stage_times + seconds)
+            between = self._between(self.grid.nodes + seconds)
+            self._shifts[seconds] = (self._inverse @ moved).T, between
+        matrix, between = self._shifts[seconds]
+        self._coefficients = self._coefficients @ matrix
+        self._frames = _blend(self._frames, *between)
 
-    def epsilon(self, t: Array, functions: Array) -> Array:
-        """Return ε at times `t` (M,) from now [s], for φ there (M, K), (M, n)."""
-        n = self.rollout.robot.dof
-        if not len(self._frames):
-            return np.zeros((len(t), n))
-        frames = self._blend(*self._between(t))
-        return np.asarray((frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0])
+    @property
+    def plan(self) -> tuple[Array, Array]:
+        """Frames and coefficients as they are now."""
+        return self._frames.copy(), self._coefficients
 
-    def functions(self, t: Array) -> Array:
+    def epsilon(self, plan: tuple[Array, Array]) -> Array:
+        """Return ε of a plan at the commands (M,), (M, n)."""
+        frames, coefficients = plan
+        if not len(frames):
+            return np.zeros((len(self._at_commands), self.rollout.robot.dof))
+        own = _blend(frames, *self._commands)
+        return np.asarray((own @ (self._at_commands @ coefficients.T)[:, :, None])[:, :, 0])
+
+    def _functions_at(self, t: Array) -> Array:
         """Return φ at times `t` (M,), (M, K)."""
         return self._null_motion.functions(np.minimum(t, self._duration), self._duration)
 
-    def improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
+    def improve(
+        self, q: Array, rate: Array, jacobian: Array, reference: PathSamples, along: Array
+    ) -> bool:
         """Make one step from a configuration and rate, along a reference given at the stages.
 
         Parameters
@@ -265,12 +317,15 @@ class Horizon:
         jacobian : (m, n)
             Task Jacobian at q.
         reference : PathSamples
+        along : (S, 6)
+            By how much its twist grows with the pace; 0 where it has none.
 
         Returns
         -------
         bool
-            Whether there is a motion: if not, only the effect of `forget` has changed.
+            Whether there is a motion.
         """
+        self._along = along[self.grid.node_stages]
         # Near singular poses numbers may overflow: such motions are rejected.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._improve(q, rate, jacobian, reference)
@@ -278,7 +333,7 @@ class Horizon:
     def _improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
         self.rollout.aim(reference)
         if not self.redundancy:
-            return self._run(q, np.zeros((len(self._functions), len(q))))
+            return self._run(q, np.zeros((len(self._functions), len(q)))) and self._paced_alone()
         if not len(self._frames) and not self._begin(q):
             return False
         first = np.empty((1, *self._frames.shape[1:]))
@@ -286,12 +341,9 @@ class Horizon:
         self._frames[0] = first[0]
         free = self._coefficients @ self._rest
         self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
-        stages = self._blend(self._node, self._share)
+        stages = _blend(self._frames, *self._stages)
         outer = stages @ (self._functions @ self._coefficients.T)[:, :, None]
         if not self._run(q, outer[:, :, 0]):
-            when = self.breakdown
-            self.forget()
-            self.breakdown = when
             return False
         basis = self._functions @ self._rest
         by_epsilon = (stages[:, :, :, None] * basis[:, None, None, :]).reshape(
@@ -299,10 +351,10 @@ class Horizon:
         )
         tangents = self.rollout.sensitivities(by_epsilon, np.zeros((len(q), self.size)))
         samples = self.rollout.samples()
+        self.damped = self._first_damped(samples)
         cost = self._cost(samples) if self._guesses else 0.0
         found = self._step(samples, *tangents)
         if found is None:
-            self.forget()
             return False
         step, predicted = found
         here = np.ascontiguousarray(samples.task_jacobian[self.grid.node_stages])
@@ -311,6 +363,23 @@ class Horizon:
             self._coefficients = better
         transport(first[0], here, PIVOT, self._frames)
         return True
+
+    def _paced_alone(self) -> bool:
+        """Adapt the pace of an arm without self-motion; return whether numbers are finite."""
+        samples = self.rollout.samples()
+        self.damped = self._first_damped(samples)
+        none = np.zeros((*samples.q.shape, 0))
+        return self._step(samples, none, none) is not None
+
+    def _first_damped(self, samples: Samples) -> float:
+        """Return when the inverse of the task Jacobian is damped first, inf for never.
+
+        Of a path that is followed on time the end tells, until it is not.
+        """
+        nodes = samples.nodes[-1:] if self.pace.is_on_time else samples.nodes
+        jacobian = samples.task_jacobian[nodes]
+        near = is_damped(jacobian @ np.swapaxes(jacobian, 1, 2))
+        return float(samples.t[nodes[np.argmax(near)]]) if near.any() else np.inf
 
     def _cost(self, samples: Samples) -> float:
         return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
@@ -359,10 +428,6 @@ class Horizon:
         share = np.minimum((t - nodes[node]) / (nodes[node + 1] - nodes[node]), 1.0)
         return np.asarray(node), share[:, None, None]
 
-    def _blend(self, node: Array, share: Array) -> Array:
-        frames = self._frames
-        return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
-
     def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, float] | None:
         """Return the step of the coefficients (d,), and by how much the cost is to fall.
 
@@ -374,36 +439,87 @@ class Horizon:
             return None
         d = self.size
         metric[np.diag_indices(d)] += REGULAR * (np.trace(metric) + 1e-12)
-        limits = self._conditions(samples, by_q, by_qd)
+        # Where self-motions alone could not keep all limits, or the tool is late.
+        paced = bool(self._along.any()) and (self.elastic or not self.pace.is_on_time)
         try:
-            step, self.elastic = elastic_step(metric, gradient, *limits)
+            if paced:
+                step = self._with_pace(metric, gradient, samples, by_q, by_qd)
+            else:
+                limits = self._conditions(samples, by_q, by_qd)
+                step, self.elastic = elastic_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)
+
+    def _with_pace(
+        self, metric: Array, gradient: Array, samples: Samples, by_q: Array, by_qd: Array
+    ) -> Array:
+        """Return the step of the coefficients (d,), and change the pace, both by one programme.
+
+        The cost is that of the self-motion, and no reason to be late.
+        """
+        d, pace = self.size, self.pace
+        slower, pull, limits = pace.programme(float(np.trace(metric)) / d if d else 1.0)
+        more = len(pull)
+        tangents = self._by_pace(samples)
+        whole = (np.concatenate(pair, axis=2) for pair in zip((by_q, by_qd), tangents, strict=True))
+        rows, low, high = self._conditions(samples, *whole)
+        paces, least, most = limits
+        both = np.block([[metric, np.zeros((d, more))], [np.zeros((more, d)), slower]])
+        step, self.elastic = elastic_step(
+            both,
+            np.append(gradient, pull),
+            np.vstack([rows, np.hstack([np.zeros((len(paces), d)), paces])]),
+            np.append(low, least),
+            np.append(high, most),
+        )
+        pace.change(step[d:])
+        return step[:d]
+
+    def _by_pace(self, samples: Samples) -> tuple[Array, Array]:
+        """Return ∂q and ∂q̇ by all rates of the pace but the first at the nodes, (S, n, J) each.
+
+        By δq = J⁺x' δs for the path x(s): what the self-motion changes on the way is left out.
+        """
+        nodes, n = samples.nodes, samples.q.shape[1]
+        jacobian, item = samples.task_jacobian[nodes], samples.follows.items[0]
+        slopes = item.task.select_along(self._along[:, :, None], samples.rotation[nodes])
+        across = np.swapaxes(jacobian, 1, 2)
+        gram = jacobian @ across + PIVOT * np.eye(jacobian.shape[1])
+        by_s = (across @ np.linalg.solve(gram, slopes))[:, :, 0]
+        turning = samples.sampling.node_differentiation(1) @ by_s
+        rates, progress = (part[:, 1:] for part in self.pace.at_nodes)
+        by_q, by_qd = (np.zeros((len(samples.q), n, rates.shape[1])) for _ in range(2))
+        by_q[nodes] = by_s[:, :, None] * progress[:, None]
+        by_qd[nodes] = by_s[:, :, None] * rates[:, None] + turning[:, :, None] * progress[:, None]
+        return by_q, by_qd
 
     def _conditions(
         self, samples: Samples, by_q: Array, by_qd: Array
     ) -> tuple[Array, Array, Array]:
         """Return rows (R, d) of the limits and distances, and their bounds, (R,) each."""
         rows, low, high = self._rows(samples, by_q, by_qd)
+        below = []
         if len(self._curved):
-            more, room = self._curve_rows(samples, by_q, by_qd)
-            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
-            low = np.concatenate([low, np.full(len(more), -np.inf)])
+            below.append(self._curve_rows(samples, by_q, by_qd))
         if self._around is not None:
-            more, room = self._around.rows(samples, by_q)
-            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
-            low = np.concatenate([low, np.full(len(more), -np.inf)])
-        return rows, low, high
+            below.append(self._around.rows(samples, by_q))
+        if self._quantities is not None:
+            below.append(self._quantities.rows(samples, by_q, by_qd, self.size))
+        if not below:
+            return rows, low, high
+        room = np.concatenate([each for _, each in below])
+        rows = np.vstack([rows, *(more for more, _ in below)])
+        return rows, np.append(low, np.full(len(room), -np.inf)), np.append(high, room)
 
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
         """Return the limits at the nodes as rows of the step, with their bounds."""
-        nodes, d = samples.nodes, self.size
+        nodes, d = samples.nodes, by_q.shape[2]
         pause = np.diff(self.grid.nodes)[:, None]
         qd, moves = samples.qd[nodes], by_qd[nodes]
         value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
         harder = np.diff(moves, axis=0) / pause[:, :, None]
-        rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
+        rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(value.size, d)
         slack = BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
 
@@ -415,4 +531,4 @@ class Horizon:
         above, below = curves.slopes(qd)
         rows = np.stack([at + above[..., None] * moves, -at + below[..., None] * moves])
         room = -curves.excess(samples.q[nodes][:, some], qd)
-        return rows.reshape(-1, self.size), room.ravel()
+        return rows.reshape(room.size, by_q.shape[2]), room.ravel()

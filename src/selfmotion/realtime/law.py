@@ -288,10 +288,11 @@ def move(states: Array, cycle: int, k: int, acceleration: float, h: float) -> No
 
 
 @kernel
-def brake(states: Array, first: int, limits: Array, h: float) -> int:
+def brake(states: Array, first: int, limits: Array, share: float, h: float) -> int:
     """Bring all joints to rest from cycle `first` on; return the cycle at which they rest.
 
-    Together, so that the arm stays on the line that it is on, as far as viable commands allow.
+    Together, so that the arm stays on the line that it is on, as far as viable commands allow, by
+    a share of the limits of acceleration.
     Where `states` (M + 1, 3, n) end before that: the last cycle.
     """
     n = states.shape[2]
@@ -299,16 +300,16 @@ def brake(states: Array, first: int, limits: Array, h: float) -> int:
         longest, moves = 0.0, False
         for k in range(n):
             w = states[cycle, 1, k]
-            longest = max(longest, abs(w) / (limits[3, k] * h))
+            longest = max(longest, abs(w) / (share * limits[3, k] * h))
             moves = moves or w != 0.0 or states[cycle, 2, k] != 0.0
         if not moves:
             return cycle
         # In this number of cycles the slowest to brake can rest.
-        share = 1.0 / max(1.0, longest)
+        part = 1.0 / max(1.0, longest)
         for k in range(n):
             c, w = states[cycle, 0, k], states[cycle, 1, k]
             low, high = viable_accelerations(c, w, limits, k, h)
-            wish = -w / h if longest <= 1.0 else -w * share / h
+            wish = -w * part / h
             move(states, cycle, k, min(max(wish, low), high), h)
             if longest <= 1.0 and low <= wish <= high:
                 # To rest, not to rounding.

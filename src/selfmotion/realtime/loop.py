@@ -11,8 +11,8 @@ import numpy.typing as npt
 from selfmotion.basics import ProblemError
 from selfmotion.model.path import Line, Path
 from selfmotion.model.task import SE3
-from selfmotion.realtime.commands import Segment
 from selfmotion.realtime.replanner import Replanner
+from selfmotion.realtime.segment import Segment
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -102,7 +102,11 @@ class Conveyed(Path):
 
     @override
     def evaluate(self, t: Array) -> PathSamples:
-        inner, velocity = self.carried.evaluate(t), np.asarray(self.velocity, dtype=np.float64)
+        return self.moved(self.carried.evaluate(t))
+
+    def moved(self, inner: PathSamples) -> PathSamples:
+        """Return samples of what is carried where they are by then."""
+        t, velocity = inner.t, np.asarray(self.velocity, dtype=np.float64)
         translation = inner.translation + np.asarray(self.offset) + t[:, None] * velocity
         twist = inner.twist + np.concatenate([velocity, np.zeros(3)])
         return PathSamples(t, translation, inner.rotation, twist)
@@ -137,6 +141,20 @@ class Approach:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             as_number(getattr(self, name), f"approach: {name}", above=0.0)
+
+    def within(self, limit: Array) -> Approach:
+        """Return the approach that leaves half of the tool's limits (4,) to the path's own motion.
+
+        Of speed, turn rate, acceleration and turn acceleration.
+        """
+        names = "speed", "turning", "acceleration", "turning_acceleration"
+        return replace(
+            self,
+            **{
+                name: min(getattr(self, name), 0.5 * float(most))
+                for name, most in zip(names, limit, strict=True)
+            },
+        )
 
     @property
     def numbers(self) -> Array:
@@ -228,70 +246,3 @@ def resting(path: Path, t: Array) -> PathSamples:
 def left_jacobian(phi: Array) -> Array:
     """Return Jl(φ), which takes φ̇ to the angular velocity of exp(φ), world axes."""
     return np.asarray(Jexp3(-phi))
-
-
-class LastPath:
-    """Samples a path, or the last one without an error.
-
-    Parameters
-    ----------
-    patience : float
-        For how long that will do [s].
-
-    Attributes
-    ----------
-    path : Path or None
-        The last one without an error.
-    """
-
-    def __init__(self, patience: float) -> None:
-        self._patience = patience
-        self.path: Path | None = None
-        self._without = 0.0
-
-    def samples(
-        self, path: Path | None, t: Array, waited: float, age: float, reasons: list[str]
-    ) -> PathSamples | None:
-        """Return the path at times (K,); the last one where it fails, and add the reason.
-
-        Also the last one if none is given: targets have their own rate, and chunks are known until
-        their last pose. None after too long: `waited` [s] since the last call, and `age` [s] since
-        the observation of a given target.
-        """
-        if path is not None:
-            found = _tried(path, t, reasons)
-            if found is not None:
-                self.path, self._without = path, age
-                return found
-        until = getattr(self.path, "until", None)
-        if path is None and self.path is not None and until is not None:
-            if t[0] <= until:
-                return _tried(self.path, t, reasons)
-            reasons.append(f"the last chunk ended {t[0] - until:.3g} s ago")
-            return None
-        self._without += waited
-        if self.path is not None and self._without <= self._patience:
-            found = None if self.path is path else _tried(self.path, t, reasons)
-            if found is not None:
-                return found
-        if path is None:
-            told = f"for {self._without:.3g} s (patience: {self._patience:.3g} s)"
-            reasons.append(f"there was no target {told if self.path else 'yet'}")
-        return None
-
-    @property
-    def followed(self) -> Path | None:
-        """The last path, while it is followed: None after too long without one."""
-        return self.path if self._without <= self._patience else None
-
-
-def _tried(path: Path, t: Array, reasons: list[str]) -> PathSamples | None:
-    """Return a path at times (K,); None where it fails, with the reason.
-
-    A path is the user's code: its exceptions must not leave the arm without a command.
-    """
-    try:
-        return resting(path, t)
-    except Exception as error:
-        reasons.append(f"the path failed: {type(error).__name__}: {error}")
-        return None

@@ -33,6 +33,40 @@ JOIN_FACTOR = 1.25
 # … and the longest [s].
 JOIN_LONGEST = 2.0
 
+# --- the pace
+# Knots of the rate, as shares of the horizon.
+PACE_KNOTS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
+# How much faster than its own time a path is followed where the tool is late …
+CATCH_UP = 0.25
+# … and how fast that fades with the delay [1/s].
+CATCHING = 4.0
+# Delay that counts as none [s].
+ON_TIME = 1e-4
+# Weight of squared delays, in horizons, relative to a step's cost …
+PACE_WEIGHT = 1e3
+# … and of squared deviations from the wanted rate, relative to that.
+SMOOTH = 1e-2
+# Largest growth of a rate in one step.
+PACE_GROWS = 0.05
+# Factor of the rates after a segment that is not proved.
+SLOWER = 0.95
+# Times that a step comes to rest earlier where the motion breaks down.
+RETREATS = 2
+# Distance of a path from another one, at the same time, that counts as a jump [m, rad].
+JUMPED = 1e-2
+# While the path right ahead [s] is out of reach, the tool waits for what is in reach again.
+RIGHT_AHEAD = 0.1
+# What the tool is off its path, or its rate off that of the path, that leaves the pace as it is
+# [m, rad, per s].
+UNNOTICED = 5e-3
+# Rate below which it stands.
+STANDING = 0.05
+# Newton steps to a pose that is in reach, the largest change of a joint in one [rad or m] …
+REACHING = 15
+LARGEST = 0.3
+# … and the distance from it that counts as none [m, rad].
+REACHED = 1e-4
+
 # --- when it stops
 # Motions that break down within this time [s] are not followed: the arm stops in less.
 SOON = 0.5
@@ -77,6 +111,30 @@ ROUNDS = 4
 BREAKING = 1e3
 # Range of distances [m].
 DISTANCES = 0.1
+
+# --- quantities
+# Share of a quantity's limit that plans leave unused, for the feedback and the time between nodes.
+QUANTITY_RESERVE = 0.05
+# The same of those that depend on accelerations, which jump between nodes.
+ACCELERATED_RESERVE = 0.1
+# Rows with more room than this share of their limit are left out of a step.
+NEAR_LIMIT = 0.5
+# Rows that no self-motion changes have no larger entry [shares of the limit].
+UNMOVED = 1e-4
+# Time in which plans leave what is exceeded [s].
+LEAVING_IN = 0.5
+# Share of a limit that is kept for bounds: of what is beside it, all segments together use it once.
+QUANTITY_BEYOND = 1e-4
+# Cycles in a group with bounds of its own, and after which what is no function of q̈ is measured.
+STRIDE = 8
+# Factor of the deceleration of stops that are not proved …
+GENTLER = 0.5
+# … the gentlest, as a share of the limit …
+GENTLEST = 1.0 / 64.0
+# … the longest of gentle ones [s] …
+LONGEST_STOP = 1.0
+# … and by how much the deceleration grows again from one step to the next.
+HARDER = 1.02
 
 # --- obstacles that move
 # Clearance of plans in addition to the required one, for the time between nodes [m].

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, as_number
-from selfmotion.realtime.commands import Segment
+from selfmotion.realtime.segment import Segment
 
 
 @dataclass(frozen=True)

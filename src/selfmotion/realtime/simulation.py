@@ -20,9 +20,9 @@ from selfmotion.planning.result import Plan, Report
 from selfmotion.problem.constraints import NO_OVERLAP, Constraint, separate_clearances
 from selfmotion.problem.costs import Cost, JointVelocity, Samples
 from selfmotion.problem.problem import Problem
-from selfmotion.realtime.commands import Segment
 from selfmotion.realtime.loop import State, follow
 from selfmotion.realtime.replanner import Replanner
+from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulated_arm import SimulatedArm
 
 # Errors of a measured arm that count as on the path [m, rad].

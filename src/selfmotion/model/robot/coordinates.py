@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 from typing_extensions import override
 
 from selfmotion.basics import (
@@ -21,6 +21,7 @@ from selfmotion.basics import (
     nearest,
     series,
 )
+from selfmotion.model.robot.chain import WORLD, Chain
 from selfmotion.model.robot.chain_series import ChainSeries
 from selfmotion.model.robot.model import RobotModel
 
@@ -38,7 +39,6 @@ def check_radians(robot: RobotModel, values: Array, what: str, called: str) -> N
             )
 
 
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 # Relative distance of an elbow from the line from shoulder to wrist below which there is no swivel,
 # and of a reference below which it gives no zero.
 _STRAIGHT = 1e-9
@@ -275,17 +275,18 @@ class SwivelAngle(Coordinate):
 
 def _points(robot: RobotModel, q: Array, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
     """Return places (K, 3) and linear Jacobians (K, 3, n) of frames."""
-    model, data = robot.model, robot.model.createData()
-    ids = [_frame(robot, name) for name in names]
-    found = [(np.empty((len(q), 3)), np.empty((len(q), 3, robot.dof))) for _ in ids]
-    for k, configuration in enumerate(q):
-        at = robot.coupling.spread(np.ascontiguousarray(configuration))
-        pin.computeJointJacobians(model, data, at)
-        for (places, jacobians), index in zip(found, ids, strict=True):
-            places[k] = pin.updateFramePlacement(model, data, index).translation
-            columns = pin.getFrameJacobian(model, data, index, _AXES).reshape(6, -1)[:3]
-            jacobians[k] = robot.coupling.columns_by_coordinate(columns)
+    chains = _chains_of.setdefault(robot, {})
+    found = []
+    for name in names:
+        if name not in chains:
+            chains[name] = Chain(robot.model, _frame(robot, name), WORLD, robot.coupling)
+        jacobians, _, places = chains[name].along(q)
+        found.append((places, jacobians[:, :3]))
     return found
+
+
+# Chains to frames of coordinates, built once by arm.
+_chains_of: WeakKeyDictionary[RobotModel, dict[str, Chain]] = WeakKeyDictionary()
 
 
 def _frame(robot: RobotModel, name: str) -> int:

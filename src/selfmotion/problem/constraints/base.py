@@ -165,7 +165,8 @@ class Constraint(Saved, ABC, family="constraint"):
     of_pace : bool
         Whether it limits the pace of a motion rather than its path in joint space.
     kept_moving : bool
-        Whether its envelope is the whole constraint, so that it can be kept while the arm moves.
+        Whether its envelope is the whole constraint, so that it can be kept while the arm moves, as
+        those with a `quantity` are.
     key, option : str
         What in a problem file, and which option besides, gives limits that are not known of an arm.
     ends : Ends
