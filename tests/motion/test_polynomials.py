@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmotion.model.motion import evaluated
+from selfmotion.model.motion import Trajectory, evaluated
 from selfmotion.model.motion.spline import inner_roots, may_vanish
 
 
@@ -70,3 +70,19 @@ def test_roots_that_lie_close_are_polished() -> None:
         wrong.append(np.abs(found - roots).max())
     # A root is known to the rounding of the value over the slope, 1e-3 here.
     assert max(wrong) < 1e-12
+
+
+def test_pieces_are_evaluated_at_any_times() -> None:
+    """Unsorted, at knots, one alone, or none; as they are by Horner's rule."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.1, 1.0, 8))
+    q, qd, qdd = rng.normal(size=(3, 8, 2))
+    motion = Trajectory(t, q, qd, ("a", "b"), qdd)
+    times = np.concatenate([rng.uniform(t[0], t[-1], 50), t, t[::-1]])
+    for order in range(4):
+        segments = motion._spline.segments(np.arange(7), order)
+        k, s = motion._spline.place(times)
+        expected = evaluated(segments[:, k], s[:, None])
+        np.testing.assert_allclose(motion(times, order), expected, rtol=1e-13, atol=1e-13)
+        assert motion(np.zeros(0), order).shape == (0, 2)
+        np.testing.assert_array_equal(motion(float(times[3]), order), motion(times[3:4], order)[0])

@@ -298,6 +298,12 @@ def test_quadratic_convergence_spares_the_last_system(panda: sm.RobotModel) -> N
     assert steps[-2].slope > 0.0
 
 
+def test_each_gradient_that_is_computed_is_counted(panda: sm.RobotModel) -> None:
+    begin, steps = nodes_of(problem(panda), 16), list[Step]()
+    minimise(begin, lambda step: bool(steps.append(step)))
+    assert begin.grid.counts.gradients == sum(step.slope > 0.0 for step in steps) > 2
+
+
 class Uphill(sm.costs.JointVelocity):
     """A cost whose gradient points the wrong way."""
 

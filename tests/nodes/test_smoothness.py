@@ -145,3 +145,14 @@ def test_costs_without_speeds_take_the_usual_weights() -> None:
     assert found is not None
     usual = np.asarray(sm.costs.JointVelocity.usual(case[0]).weight)
     np.testing.assert_allclose(np.diagonal(found.weight), np.broadcast_to(usual, case[0].dof))
+
+
+def test_costs_that_are_no_quadratic_forms_have_no_order(case: Case) -> None:
+    """Of others it is that of the highest derivative."""
+    hill = sm.costs.FunctionCost(lambda qd, q, t: np.sum(q**2, axis=1))
+    for costs, order in (
+        ([hill], 0),
+        ([hill, sm.costs.JointVelocity()], 1),
+        ([sm.costs.JointJerk(), sm.costs.JointVelocity()], 3),
+    ):
+        assert smoothness.highest_order(Formulation.of(problem_of(case, costs=costs))) == order
