@@ -195,7 +195,7 @@ class Spline:
             return evaluated(self.segments(k, order), s[..., None])
         found = np.empty((t.size, self.q.shape[1]))
         evaluate_pieces(self._knots, self._every(order), plain(t.ravel()), found)
-        return found.reshape(*t.shape, -1)
+        return found.reshape(*t.shape, self.q.shape[1])
 
     def travelled(self, t: Array) -> Array:
         """Return the path lengths up to times t (K,), (K, n)."""
