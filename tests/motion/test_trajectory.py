@@ -30,6 +30,8 @@ def test_trajectory_interpolates_cubics_exactly() -> None:
     np.testing.assert_allclose(motion(s, 1)[:, 0], 3 * s**2, atol=1e-14)
     np.testing.assert_allclose(motion(s, 2)[:, 0], 6 * s, atol=1e-13)
     assert motion(0.5).shape == (1,)
+    assert motion(np.zeros(0)).shape == (0, 1)
+    assert motion(np.zeros((2, 0)), 1).shape == (2, 0, 1)
     for time in (1.1, np.nan):
         with pytest.raises(ValueError, match="outside the motion"):
             motion(time)

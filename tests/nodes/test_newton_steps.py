@@ -1,6 +1,7 @@
 """Single steps of Newton's method: what they predict, how far they go, and why they end."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from selfmotion.planning.nodes.newton import (
 from selfmotion.planning.nodes.newton_system import Change, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner.outcomes import NodeOutcome
+from selfmotion.planning.planner.refinement import DividesAtNodes, refined
 from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, start_of
 from support.nodes import centred, moved, nodes_of, problem_of, random_step
@@ -339,10 +342,17 @@ def test_a_rejected_step_is_cut_to_the_least_of_its_parabola() -> None:
     assert _shorter(0.2, 1.0, -5.0) == pytest.approx(0.2 * SETTINGS.backtracking)
 
 
+@pytest.mark.parametrize(
+    ("share", "status"),
+    [(0.5, Status.PRECISION), (2.0, Status.INFEASIBLE), (None, Status.INFEASIBLE)],
+)
 def test_steps_that_lead_nowhere_are_given_up(
-    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch, share: float | None, status: Status
 ) -> None:
-    """As soon as enough of them are short in a row; a longer one between them begins anew."""
+    """As soon as enough of them are short in a row; a longer one between them begins anew.
+
+    Where next to nothing was left to gain, the last one is an optimum.
+    """
     short, long = 0.5 * SETTINGS.short_length, 2.0 * SETTINGS.short_length
     count = SETTINGS.short_steps
     wanted = [short] * (count - 1) + [long] + [short] * (2 * count)
@@ -351,10 +361,12 @@ def test_steps_that_lead_nowhere_are_given_up(
     def advance(solver: _Solver, callback: object) -> None:
         taken.append(wanted[len(taken)])
         solver._length = taken[-1]
+        if share is not None:
+            solver._predicted = share * SETTINGS.rounding * solver._cost_scale
 
     monkeypatch.setattr(_Solver, "advance", advance)
     found = minimise(nodes_of(problem(panda), 8), never)
-    assert found.status is Status.INFEASIBLE
+    assert found.status is status
     assert len(taken) == 2 * count
 
 
@@ -368,6 +380,27 @@ def test_from_a_neighbouring_optimum_the_finest_is_found(panda: sm.RobotModel) -
     assert rough.is_rough
     assert not fine.is_rough
     assert not minimise(begin, never).is_rough
+
+
+def test_an_optimum_is_polished_once_on_its_nodes(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where rounding ends that before the tightest tolerances."""
+    begin = nodes_of(problem(panda, sm.constraints.JointVelocityLimits(LOOSE)), 16)
+    rough = minimise(begin, never, roughly=True)
+    known = NodeOutcome.of(replace(rough, status=Status.PRECISION), Status.PRECISION)
+    assert rough.is_rough
+    asked: list[bool] = []
+
+    def again(known: NodeOutcome, *, roughly: bool = False) -> NodeOutcome:
+        asked.append(roughly)
+        return known
+
+    monkeypatch.setattr(DividesAtNodes, "_wanted", lambda *_: None)
+    recorder, formulation = SimpleNamespace(ended=None), begin.grid.formulation
+    search = SimpleNamespace(recorder=recorder, formulation=formulation, again=again)
+    refined(known, DividesAtNodes(search))
+    assert asked == [False]
 
 
 def test_settings_are_within_the_ranges_of_their_sources() -> None:

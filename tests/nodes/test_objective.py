@@ -6,10 +6,12 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.robot import has_masses
-from selfmotion.planning.formulation import with_springs
+from selfmotion.planning.formulation import Formulation, with_springs
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, objective, on_grid
 from selfmotion.planning.nodes.motion import slopes_of, terms_of
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
+from selfmotion.planning.nodes.quadratic import QuadraticForms
+from selfmotion.planning.nodes.spline import Quintic
 from selfmotion.planning.optimise import Banded
 from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, Case
@@ -215,3 +217,30 @@ def test_costs_by_their_forms_are_those_by_their_samples(case: Case) -> None:
     motion = centred(moved(motion, random_step(motion, 1, 0.02)))
     assert motion.grid.cost.is_quadratic
     assert motion.cost == pytest.approx(sum(terms_of(motion).values()), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("cost", "integral"),
+    [
+        (sm.costs.JointVelocity(), 10.0 / 7.0),
+        (sm.costs.JointAcceleration(), 120.0 / 7.0),
+        (sm.costs.JointJerk(), 720.0),
+    ],
+)
+@pytest.mark.parametrize("count", [1, 400])
+def test_costs_by_their_forms_keep_their_digits_on_short_intervals(
+    panda: sm.RobotModel, cost: sm.costs.Cost, integral: float, count: int
+) -> None:
+    """Of a rise of 1 in 1 s by 10 s³ - 15 s⁴ + 6 s⁵, whose integrals of squares are known."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 1.0, normal=(1.0, 0.0, 0.0))
+    problem = problem_of((panda, "position", PANDA_HOME, path), costs=[cost])
+    s = np.linspace(0.0, 1.0, count + 1)
+    rise = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+    each = np.stack([rise(s), rise.deriv(1)(s), rise.deriv(2)(s)], axis=1)
+    nodes = np.tile(each[:, :, None], (1, 1, panda.dof))
+    nodes[:, 0] += PANDA_HOME
+    spline = Quintic(s)
+    forms = QuadraticForms(Formulation.of(problem), spline, None)
+    costs = forms.at(spline.ends(nodes)).costs
+    # Rounding of q is 1e-16, and a jerk is a difference of q over the third power of 1/400 s.
+    assert costs.sum() == pytest.approx(0.5 * panda.dof * integral, rel=1e-9)

@@ -27,11 +27,13 @@ def read_only(values: npt.ArrayLike) -> Array:
 
 
 def plain(values: Array) -> Array:
-    """Return an array as kernels take it: contiguous and writeable; a copy where it is not.
+    """Return an array as kernels take it: in C order and writeable; a copy where it is not.
 
     For each other kind of array numba would compile another kernel.
     """
-    return values if values.flags.carray else np.array(values, dtype=np.float64)
+    if values.dtype == np.float64 and values.flags.carray:
+        return values
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def per_joint(values: npt.ArrayLike, dof: int, what: str, *, positive: bool = False) -> Array:

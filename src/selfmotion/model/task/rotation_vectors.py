@@ -37,7 +37,7 @@ def exponentials(vectors: Array, rates: Array) -> tuple[Array, Array]:
     Jl(δ) = I + a [δ]× + b [δ]×² is the left Jacobian of SO(3).
     """
     square = np.einsum("si,si->s", vectors, vectors)
-    a, b = np.transpose([exponential_coefficients(x) for x in square.tolist()])
+    a, b = np.reshape([exponential_coefficients(x) for x in square.tolist()], (-1, 2)).T
     delta, outer = skews(vectors), vectors[:, :, None] * vectors[:, None, :]
     # sin θ / θ [δ]× + a [δ]×² + I, with [δ]×² = δδᵀ - θ² I.
     sine, cosine = 1.0 - b * square, 1.0 - a * square

@@ -111,7 +111,9 @@ def minimise(
             return solver.optimum(status)
         short = short + 1 if solver.length < SETTINGS.short_length else 0
         if short == SETTINGS.short_steps:
-            return solver.optimum(Status.INFEASIBLE)
+            # As where no step is accepted at all.
+            ended = Status.PRECISION if solver.promises_little else Status.INFEASIBLE
+            return solver.optimum(ended)
         violation, stalled = solver.motion.violation, stalled + 1
         falls = violation < SETTINGS.stall_factor * smallest
         if falls or violation <= SETTINGS.gauss_newton_violation:
@@ -172,6 +174,11 @@ class _Solver:
     def length(self) -> float:
         """Accepted share of the last step."""
         return self._length
+
+    @property
+    def promises_little(self) -> bool:
+        """Whether the predicted decrease is so small that rounding may hide it."""
+        return self._predicted <= SETTINGS.rounding * self._cost_scale
 
     def optimum(self, status: Status) -> Optimum:
         """Return the iterate as a result."""
@@ -309,8 +316,7 @@ class _Solver:
             else:
                 length *= SETTINGS.backtracking
         conditions = self._multipliers.size or len(self._end_multipliers)
-        is_rounding = self._predicted <= SETTINGS.rounding * self._cost_scale
-        if is_rounding and (conditions or not is_opposed):
+        if self.promises_little and (conditions or not is_opposed):
             return Status.PRECISION
         # A large predicted decrease that no step has, or a rise in place of one: the gradient is
         # wrong, or rows conflict.

@@ -1,7 +1,9 @@
 """What is quadratic in a motion of nodes: costs of derivatives, springs, and the smoothing.
 
-Of the ends y of each interval, see `Quintic`, it is a constant, a linear part and ½ yᵀKy, with the
-same K for all motions on the same nodes.
+Of the ends y of each interval, see `Quintic`, it is a constant, a linear part and ½ uᵀKu, with the
+same K for all motions on the same nodes. u is the Taylor polynomial of the left node, and what it
+leaves of q, q̇ and q̈ at the right one: of a derivative, y would cancel the digits that say how the
+curve bends on a short interval.
 """
 
 from collections.abc import Sequence
@@ -19,10 +21,13 @@ from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples, is_qu
 
 # Derivatives of a sample, by order.
 NAMES = ("q", "qd", "qdd", "qddd")
+# u by y.
+_BENT = np.eye(6)
+_BENT[3:, :3] = -np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
 class _Form(NamedTuple):
-    """A quadratic form ½ Σ K_ab y_aᵀWy_b of the ends y of each interval.
+    """A quadratic form ½ Σ K_ab u_aᵀWu_b of each interval.
 
     Attributes
     ----------
@@ -97,7 +102,7 @@ class QuadraticForms:
         self._coupled = [form for form in (*smooth, *own) if not form.is_diagonal]
 
     def _each_joint(self, forms: Sequence[_Form]) -> Array:
-        """Return the sum of forms that couple no joints, (N, n, 6, 6) by y of each."""
+        """Return the sum of forms that couple no joints, (N, n, 6, 6) by u of each."""
         found = np.zeros((self._spline.count, self._size, 6, 6))
         for form in forms:
             if form.is_diagonal:
@@ -106,8 +111,10 @@ class QuadraticForms:
         return found
 
     @cached_property
-    def _of_both(self) -> Array:
-        return self._of_costs + self._of_smoothing
+    def _curvature(self) -> tuple[Array, list[tuple[Array, Array]]]:
+        """Second derivatives by y: of each joint (N, n, 6, 6), and K and W of coupled forms."""
+        coupled = [(_by_ends(form.stiffness), form.weight) for form in self._coupled]
+        return _by_ends(self._of_costs + self._of_smoothing), coupled
 
     @cached_property
     def _at_origin(self) -> tuple[Array, Array]:
@@ -128,29 +135,38 @@ class QuadraticForms:
         values, linear = self._at_origin
         costs, smoothing, slopes = values.copy(), np.zeros(len(ends)), linear.copy()
         evaluate_forms(self._of_costs, self._of_smoothing, ends, costs, smoothing, slopes)
-        arm, pushes = ends[:, :, : self._dof], slopes[:, :, : self._dof]
+        pushes = slopes[:, :, : self._dof]
         for form in self._coupled:
+            arm = _BENT @ ends[:, :, : self._dof]
             pushed = form.stiffness @ (arm @ form.weight)
             values = smoothing if form.is_smoothing else costs
             values += 0.5 * np.einsum("kaj,kaj->k", arm, pushed)
-            pushes += pushed
+            pushes += _BENT.T @ pushed
         return Quadratic(costs, smoothing, slopes)
 
     def add_curvature(self, matrix: NodeMatrix, by: EndChanges) -> None:
         """Add the second derivatives by the coordinates of all nodes."""
-        matrix.add_joint_forms(by, self._of_both)
-        for form in self._coupled:
-            matrix.add_form(by, form.stiffness, form.weight)
+        forms, coupled = self._curvature
+        matrix.add_joint_forms(by, forms)
+        for stiffness, weight in coupled:
+            matrix.add_form(by, stiffness, weight)
 
 
 def _stiffness(spline: Quintic, order: int, shares: Array | None = None) -> Array:
-    """Return K of ½ Σ K_ab y_aᵀWy_b for the ends y of each interval, (N, 6, 6)."""
-    table, scale = AT_GAUSS[order], spline.rates[2 * order] * spline.steps
+    """Return K of ½ Σ K_ab u_aᵀWu_b of each interval, (N, 6, 6)."""
+    table, scale = AT_GAUSS[order] @ np.linalg.inv(_BENT), spline.rates[2 * order] * spline.steps
+    # A Taylor polynomial of lower degree has no such derivative.
+    table[:, :order] = 0.0
     scale[spline.gaps] = 0.0
     if shares is None:
         return np.asarray(scale[:, None, None] * (table.T @ (WEIGHTS[:, None] * table)))
     weighted = (WEIGHTS * shares)[:, :, None] * table
     return np.asarray(scale[:, None, None] * (table.T @ weighted))
+
+
+def _by_ends(forms: Array) -> Array:
+    """Return second derivatives by y, for those by u, (…, 6, 6)."""
+    return np.ascontiguousarray(_BENT.T @ forms @ _BENT)
 
 
 def integrals(spline: Quintic, costs: Sequence[Cost], samples: Samples) -> Array:
@@ -193,19 +209,31 @@ def evaluate_forms(
     smoothing_values: Array,
     slopes: Array,
 ) -> None:
-    """Add ½ yᵀKy + gᵀy to the values (N,) of intervals with y = `ends` (N, 6, n).
+    """Add ½ uᵀKu + gᵀy to the values (N,) of intervals with y = `ends` (N, 6, n).
 
     K (N, n, 6, 6) of `costs` and of `smoothing`; `slopes` (N, 6, n) are g of the costs before, and
-    g + Ky of both afterwards.
+    the derivatives of both by y afterwards.
     """
     count, _, n = ends.shape
+    u, pushes = np.empty(6), np.empty(6)
     for k in range(count):
         for j in range(n):
             for a in range(6):
+                u[a] = ends[k, a, j]
+                cost_values[k] += u[a] * slopes[k, a, j]
+            u[3] = u[3] - u[0] - u[1] - 0.5 * u[2]
+            u[4] = u[4] - u[1] - u[2]
+            u[5] = u[5] - u[2]
+            for a in range(6):
                 pushed, smoothed = 0.0, 0.0
                 for b in range(6):
-                    pushed += costs[k, j, a, b] * ends[k, b, j]
-                    smoothed += smoothing[k, j, a, b] * ends[k, b, j]
-                cost_values[k] += ends[k, a, j] * (slopes[k, a, j] + 0.5 * pushed)
-                smoothing_values[k] += 0.5 * ends[k, a, j] * smoothed
-                slopes[k, a, j] += pushed + smoothed
+                    pushed += costs[k, j, a, b] * u[b]
+                    smoothed += smoothing[k, j, a, b] * u[b]
+                cost_values[k] += 0.5 * u[a] * pushed
+                smoothing_values[k] += 0.5 * u[a] * smoothed
+                pushes[a] = pushed + smoothed
+            pushes[0] -= pushes[3]
+            pushes[1] -= pushes[3] + pushes[4]
+            pushes[2] -= 0.5 * pushes[3] + pushes[4] + pushes[5]
+            for a in range(6):
+                slopes[k, a, j] += pushes[a]

@@ -72,7 +72,7 @@ class DividesAtNodes:
 
     def __init__(self, search: LocalSearch) -> None:
         self._search, self._most = search, most_nodes(search.formulation)
-        self._cost, self._rounds = np.inf, _NODE_ROUNDS
+        self._cost, self._has_polished, self._rounds = np.inf, False, _NODE_ROUNDS
 
     def __call__(self, known: NodeOutcome) -> NodeOutcome | None:
         """Return the optimum on more nodes, or the last one; None where it may not, or need not."""
@@ -83,7 +83,9 @@ class DividesAtNodes:
         t = self._wanted(known)
         finer = None if t is None or len(t) > self._most else known.on(t)
         polishes = finer is None
-        if polishes and known.optimum is not None and not known.optimum.is_rough:
+        is_fine = known.optimum is not None and not known.optimum.is_rough
+        # Once more on the same nodes gains nothing where that ended by rounding.
+        if polishes and (is_fine or self._has_polished):
             return None
         found = search.again(finer or known, roughly=not polishes)
         if found is None:
@@ -93,6 +95,7 @@ class DividesAtNodes:
             self._rounds = 0
             return self._without_more(known, found, polishes)
         gained = max(known.cost - found.cost, 0.0)
+        self._has_polished = polishes
         return replace(found, remaining=(found.remaining or 0.0) + gained)
 
     def _wanted(self, known: NodeOutcome) -> Array | None:
