@@ -360,7 +360,7 @@ def test_steps_that_lead_nowhere_are_given_up(
 
     def advance(solver: _Solver, callback: object) -> None:
         taken.append(wanted[len(taken)])
-        solver._length = taken[-1]
+        solver.length = taken[-1]
         if share is not None:
             solver._predicted = share * SETTINGS.rounding * solver._cost_scale
 

@@ -126,7 +126,8 @@ def minimise(
 class _Solver:
     """Iterate of Newton's method: a motion, slacks, multipliers and the barrier parameter.
 
-    s, e and λ are those of the active rows, in their order.
+    s, e and λ are those of the active rows, in their order; `length` is the accepted share of the
+    last step.
     """
 
     def __init__(
@@ -149,7 +150,7 @@ class _Solver:
         self._update_active_set()
         if multipliers is not None:
             _warm_start(self, multipliers)
-        self._merit_penalty, self._predicted, self._length, self._shift = 0.0, np.inf, 0.0, 0.0
+        self._merit_penalty, self._predicted, self.length, self._shift = 0.0, np.inf, 0.0, 0.0
         self._end_multipliers = np.zeros(start.grid.ends.count)
         self._multiplier_change = np.inf if self._multipliers.size else 0.0
 
@@ -171,11 +172,6 @@ class _Solver:
         self._slacks, self._elastics, self._multipliers = (values[near] for values in full)
 
     @property
-    def length(self) -> float:
-        """Accepted share of the last step."""
-        return self._length
-
-    @property
     def promises_little(self) -> bool:
         """Whether the predicted decrease is so small that rounding may hide it."""
         return self._predicted <= SETTINGS.rounding * self._cost_scale
@@ -194,13 +190,13 @@ class _Solver:
     def advance(self, callback: Callback) -> Status | None:
         """Take a step; return the status where the method ends."""
         if self._predicts_convergence():
-            callback(Step(self.motion, 0.0, self._length))
+            callback(Step(self.motion, 0.0, self.length))
             return Status.CONVERGED
         model = Model.of(self.motion, self._rows, self._end_multipliers)
         if model is None:
             return Status.GRADIENT
         slope = float(np.linalg.norm(model.gradient))
-        if callback(Step(self.motion, slope, self._length)):
+        if callback(Step(self.motion, slope, self.length)):
             return Status.STOPPED
         system = self._system(model)
         if system is None:
@@ -264,7 +260,7 @@ class _Solver:
     def _predicts_convergence(self) -> bool:
         """Whether quadratic convergence predicts no further decrease."""
         promised = self._predicted / self._cost_scale
-        full = self._length == 1.0
+        full = self.length == 1.0
         if not (full and promised <= SETTINGS.quadratic_share and self._is_last_barrier):
             return False
         if self._multiplier_change > np.sqrt(SETTINGS.multiplier_tolerance):
@@ -302,7 +298,7 @@ class _Solver:
                     )
                     self._multipliers = self._multipliers + share * step.multipliers
                     self._slacks, self._elastics = moved
-                    self.motion, self._length = new, length
+                    self.motion, self.length = new, length
                     self._end_multipliers = step.end_multipliers
                     self._update_active_set()
                     return None
