@@ -24,7 +24,9 @@ from selfmotion.shell.documents.constraint_tables import (
 from selfmotion.shell.documents.cost_tables import COSTS, NULL_MOTIONS, AnyCost
 from selfmotion.shell.documents.job_tables import JobTable, SeamTable
 from selfmotion.shell.documents.one_of import OneOf
-from selfmotion.shell.documents.path_tables import PATHS, FilePoses, LeadsTable, WeaveTable
+from selfmotion.shell.documents.path_base import LeadsTable, WeaveTable
+from selfmotion.shell.documents.path_tables import PATHS
+from selfmotion.shell.documents.pose_tables import FilePoses
 from selfmotion.shell.documents.problem_table import (
     FollowTable,
     InPartsTable,
@@ -143,7 +145,7 @@ def test_a_key_is_written_in_one_file_of_the_shell() -> None:
     texts = {file.name: file.read_text("utf-8") for file in SHELL.rglob("*.py")}
     for key in keys:
         named = {name for name, text in texts.items() if re.search(rf"\b{key}\b", text)}
-        assert named - {"moved.py"} == {"path_tables.py"}, key
+        assert named - {"moved.py"} == {"pose_tables.py"}, key
 
 
 def test_kinds_that_are_made_while_it_is_planned_are_in_no_file() -> None:

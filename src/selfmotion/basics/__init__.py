@@ -4,6 +4,7 @@
 `arrays`    types of arrays, and arguments that are checked and made numbers (``as_…``)
 `errors`    all errors, one tree
 `files`     files, read and written whole or not at all; digests
+`intervals` places among increasing numbers, compiled
 `jit`       numerical kernels, compiled by numba once per machine
 `progress`  what is told while something runs, and interruption
 `saved`     classes that describe themselves in files, and are restored by their kind
@@ -83,6 +84,7 @@ from selfmotion.basics.interruption import (
     presses as presses,
     was_interrupted as was_interrupted,
 )
+from selfmotion.basics.intervals import interval_of as interval_of
 from selfmotion.basics.jit import (
     ALL_WORKS as ALL_WORKS,
     FIRST_WORKS as FIRST_WORKS,

@@ -143,13 +143,14 @@ def recentred(coefficients: Array, middle: Array, half: Array) -> Array:
     return found.reshape(size, *shape)
 
 
-def holds_for(item: object, *methods: str) -> bool:
-    """Return whether an object's `series` is valid for these methods of its class.
+def holds_for(item: object, *methods: str, says: str = "series") -> bool:
+    """Return whether what an object `says` is valid for these methods of its class.
 
-    A class of one's own that derives from one of ours and moves otherwise has none.
+    A class of one's own that derives from one of ours and moves otherwise says nothing, unless it
+    says it itself.
     """
     order = type(item).__mro__
-    first = next(k for k, kind in enumerate(order) if "series" in vars(kind))
+    first = next(k for k, kind in enumerate(order) if says in vars(kind))
     return not any(name in vars(kind) for kind in order[:first] for name in methods)
 
 

@@ -182,11 +182,16 @@ def aim(kind: int, gain: float, tip: Tip) -> None:
 @inlined
 def observe(base_jacobian: Array, rotation: Array, translation: Array, tip: Tip) -> None:
     """Set a tip's pose and its Jacobian J6."""
+    _set_pose(tip, rotation, translation)
+    at_tip(base_jacobian, translation, tip.jacobian)
+
+
+@inlined
+def _set_pose(tip: Tip, rotation: Array, translation: Array) -> None:
     for i in range(3):
         tip.translation[i] = translation[i]
         for j in range(3):
             tip.rotation[i, j] = rotation[i, j]
-    at_tip(base_jacobian, translation, tip.jacobian)
 
 
 @inlined
@@ -468,10 +473,7 @@ def evaluate_motion(
 @inlined
 def _write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
     """Write a tip's pose and Jacobian into the table; its command is its path's twist."""
-    for i in range(3):
-        tip.translation[i] = place[i]
-        for j in range(3):
-            tip.rotation[i, j] = turn[i, j]
+    _set_pose(tip, turn, place)
     for i in range(6):
         tip.command[i] = tip.target_twist[i]
         for j in range(six.shape[1]):

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, kernel, plain, series
+from selfmotion.basics import Array, Ints, interval_of, kernel, plain, series
 
 # Relative size below which a leading coefficient counts as zero.
 _NOTHING = 1e-13
@@ -268,19 +268,9 @@ def evaluate_pieces(knots: Array, pieces: Array, t: Array, found: Array) -> None
 
     Coefficients of 1, s, s² … with s from 0 to 1; the first and the last piece go on beyond.
     """
-    degree, last = len(pieces) - 1, len(knots) - 2
-    piece = 0
+    degree = len(pieces) - 1
     for k in range(len(t)):
-        # Times mostly come in order.
-        if not (knots[piece] <= t[k] and (piece == last or t[k] < knots[piece + 1])):
-            low, high = 0, last + 1
-            while high - low > 1:
-                middle = (low + high) // 2
-                if t[k] >= knots[middle]:
-                    low = middle
-                else:
-                    high = middle
-            piece = low
+        piece = interval_of(knots, t[k])
         s = (t[k] - knots[piece]) / (knots[piece + 1] - knots[piece])
         for j in range(found.shape[1]):
             value = pieces[degree, piece, j]

@@ -1,6 +1,6 @@
 """Cubic splines of positions and of orientations at many times, compiled."""
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, inlined, interval_of, kernel
 from selfmotion.model.task import exponential_coefficients
 
 
@@ -11,7 +11,7 @@ def cubics_at(x: Array, c: Array, t: Array, values: Array, rates: Array) -> None
     Its breaks are x (N,), its coefficients c (4, N - 1, 3), the highest first.
     """
     for k in range(len(t)):
-        piece = _piece(x, t[k])
+        piece = interval_of(x, t[k])
         s = t[k] - x[piece]
         for i in range(3):
             values[k, i], rates[k, i] = _cubic(c, piece, i, s)
@@ -26,7 +26,7 @@ def turns_at(x: Array, c: Array, first: Array, t: Array, rotations: Array, angul
     Jl(δ) = I + a [δ]× + b [δ]×² of SO(3).
     """
     for k in range(len(t)):
-        piece = _piece(x, t[k])
+        piece = interval_of(x, t[k])
         s = t[k] - x[piece]
         d0, r0 = _cubic(c, piece, 0, s)
         d1, r1 = _cubic(c, piece, 1, s)
@@ -48,19 +48,6 @@ def turns_at(x: Array, c: Array, first: Array, t: Array, rotations: Array, angul
             rotations[k, i, 1] = cosine * f1 + sine * (f2 * d0 - f0 * d2) + inside * d1
             rotations[k, i, 2] = cosine * f2 + sine * (f0 * d1 - f1 * d0) + inside * d2
             angular[k, i] = f0 * rate0 + f1 * rate1 + f2 * rate2
-
-
-@inlined
-def _piece(x: Array, t: float) -> int:
-    """Return the number of the piece that a time is in; the first and the last go on beyond."""
-    low, high = 0, len(x) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if t >= x[middle]:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @inlined

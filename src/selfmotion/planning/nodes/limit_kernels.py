@@ -85,18 +85,18 @@ class LimitTable(NamedTuple):
         return found
 
     def along(self, rates: Array, changes: Array) -> Array:
-        """Return ∂h of all rows along changes of y (N, 6, n)."""
-        found = np.empty(self.size)
-        _set_along(*self, _TABLES, rates, changes, found)
-        return found
+        """Return ∂h of the rows that may become active, along changes of y (N, 6, n)."""
+        none = np.zeros(len(self.joints))
+        linear = self._replace(lower=none, upper=none, offset=np.zeros(len(self.orders)))
+        return linear.residuals(rates, changes)
 
     def add_pulled(self, rates: Array, multipliers: Array, found: Array) -> None:
         """Add Σ multipliers ∂h/∂y to `found` (N, 6, n)."""
-        _add_pulled(*self, _TABLES, rates, multipliers, found)
+        _add_pulled(*self[:4], self.scale, _TABLES, rates, multipliers, found)
 
     def add_squared(self, rates: Array, weights: Array, found: Array) -> None:
         """Add Σ weights ∂h ∂hᵀ by y of each joint to `found` (N, n, 6, 6)."""
-        _add_squared(*self, _TABLES, rates, weights, found)
+        _add_squared(*self[:4], self.scale, _TABLES, rates, weights, found)
 
 
 @inlined
@@ -159,42 +159,12 @@ def _set_near(
 
 
 @kernel
-def _set_along(
-    orders: Ints,
-    first_rows: Ints,
-    first_joints: Ints,
-    joints: Ints,
-    lower: Array,
-    upper: Array,
-    scale: Array,
-    offset: Array,
-    tables: Array,
-    rates: Array,
-    changes: Array,
-    found: Array,
-) -> None:
-    for f in range(len(orders)):
-        o, first, row = orders[f], first_joints[f], first_rows[f]
-        size = first_joints[f + 1] - first
-        for k in range(len(changes)):
-            for p in range(6 - o):
-                for j in range(size):
-                    x = rates[o, k] * _value(tables[o], p, changes, k, joints[first + j])
-                    found[row + j] = x / scale[first + j]
-                    found[row + size + j] = -x / scale[first + j]
-                row += 2 * size
-
-
-@kernel
 def _add_pulled(
     orders: Ints,
     first_rows: Ints,
     first_joints: Ints,
     joints: Ints,
-    lower: Array,
-    upper: Array,
     scale: Array,
-    offset: Array,
     tables: Array,
     rates: Array,
     multipliers: Array,
@@ -220,10 +190,7 @@ def _add_squared(
     first_rows: Ints,
     first_joints: Ints,
     joints: Ints,
-    lower: Array,
-    upper: Array,
     scale: Array,
-    offset: Array,
     tables: Array,
     rates: Array,
     weights: Array,

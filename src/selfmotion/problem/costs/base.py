@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers, shown
+from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers, series, shown
 from selfmotion.model.follow import Follows
 from selfmotion.problem.costs.samples import Samples
 
@@ -84,14 +84,8 @@ def is_quadratic_form(cost: Cost) -> bool:
     Where it says so (`Cost.is_quadratic`), but not where a class that derives from one that does is
     evaluated otherwise.
     """
-    if not cost.is_quadratic:
-        return False
-    for kind in type(cost).__mro__:
-        if "is_quadratic" in vars(kind):
-            return True
-        if not vars(kind).keys().isdisjoint(("value", "gradient", "curvature")):
-            return False
-    return True
+    evaluated = ("value", "gradient", "curvature")
+    return cost.is_quadratic and series.holds_for(cost, *evaluated, says="is_quadratic")
 
 
 def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:

@@ -1,8 +1,8 @@
 """Problem files and job files: what they may say, read and written.
 
 The format, table by table: `problem_table` is a whole problem file and `job_tables` a job file;
-`robot_tables`, `path_tables`, `cost_tables`, `constraint_tables` and `body_tables` are what these
-are made of. What a table is, `tables` says. They are imported when a file is read.
+`robot_tables`, `path_tables`, `pose_tables`, `cost_tables`, `constraint_tables` and `body_tables`
+are what these are made of. What a table is, `tables` says. They are imported when a file is read.
 """
 
 from collections.abc import Mapping
@@ -49,6 +49,6 @@ def json_schema() -> dict[str, Any]:
 
 def flipped_normals(table: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """Return a table of a file of poses with its normals the other way, and how to say that."""
-    from selfmotion.shell.documents import path_tables
+    from selfmotion.shell.documents import pose_tables
 
-    return path_tables.flipped_normals(table)
+    return pose_tables.flipped_normals(table)

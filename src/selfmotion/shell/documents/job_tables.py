@@ -29,7 +29,9 @@ from selfmotion.shell.documents.field_types import (
     of_kind,
 )
 from selfmotion.shell.documents.one_of import Either
-from selfmotion.shell.documents.path_tables import Events, FilePoses, ToolMotion, after
+from selfmotion.shell.documents.path_base import Events, after
+from selfmotion.shell.documents.path_tables import ToolMotion
+from selfmotion.shell.documents.pose_tables import FilePoses
 from selfmotion.shell.documents.problem_table import PartTable, SharedTable, start_of
 from selfmotion.shell.documents.seam_job import SeamJob
 from selfmotion.shell.documents.tables import Context, Table
