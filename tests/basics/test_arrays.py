@@ -1,9 +1,12 @@
 """Arrays as compiled kernels take them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from selfmotion.basics import plain
+from selfmotion.basics import plain, plain_numbers, scaled
+from selfmotion.model.path import pose_of
 
 
 @pytest.mark.parametrize(
@@ -45,3 +48,20 @@ def test_kernels_get_one_kind_of_array(kind: str) -> None:
     assert found.dtype.isnative
     np.testing.assert_array_equal(found, given)
     assert (found is values) is (kind == "C")
+
+
+@pytest.mark.parametrize(
+    "values", [True, [True, 0.0, 0.0], [[1.0, 2.0], [3.0, False]], (1, np.bool_(True)), ["1.5", 0]]
+)
+def test_texts_and_flags_are_no_numbers_wherever_they_stand(values: Any) -> None:
+    """NumPy takes a flag among numbers for one, and a text of digits as well."""
+    assert plain_numbers(values) is None
+    assert plain_numbers([1, 2.5, 3]) is not None
+
+
+@pytest.mark.parametrize("values", [["1.5", 0.0, 0.0], [True, 0.0, 0.0], [{"a": 1.0}, 0.0, 0.0]])
+def test_no_pose_is_read_of_what_is_no_numbers(values: Any) -> None:
+    with pytest.raises(ValueError, match=r"position is .*, expected 3 numbers"):
+        pose_of({"position": values})
+    with pytest.raises(ValueError, match="expected numbers"):
+        scaled([{"a": 1.0}, *values], 1e-3)

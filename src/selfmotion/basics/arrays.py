@@ -64,7 +64,16 @@ def plain_numbers(values: Any) -> Array | None:
         array = np.asarray(values)
     except (TypeError, ValueError):
         return None
-    return np.asarray(array, dtype=np.float64) if array.dtype.kind in "iuf" else None
+    # Of a list NumPy takes a flag among numbers for one.
+    if array.dtype.kind not in "iuf" or _has_flag(values):
+        return None
+    return np.asarray(array, dtype=np.float64)
+
+
+def _has_flag(values: Any) -> bool:
+    if isinstance(values, list | tuple):
+        return any(map(_has_flag, values))
+    return isinstance(values, bool | np.bool_)
 
 
 def is_ragged(values: Any) -> bool:

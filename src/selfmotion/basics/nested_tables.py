@@ -216,17 +216,20 @@ def _inner(value: Any, where: str) -> Any:
 
 
 def scaled(value: Any, factor: float) -> Any:
-    """Return a number, or those of lists and tables of numbers, times a factor.
+    """Return a number, or those of lists or of a table of numbers, times a factor.
 
     Raises
     ------
     ValueError
         It is something else; the message says what.
     """
-    if isinstance(value, list):
-        return [scaled(item, factor) for item in value]
     if isinstance(value, Mapping):
         return {key: scaled(item, factor) for key, item in value.items()}
+    if isinstance(value, list):
+        tables = [item for item in value if isinstance(item, Mapping)]
+        if tables:
+            raise ValueError(f"is {value!r}, expected numbers")
+        return [scaled(item, factor) for item in value]
     if not is_number(value):
         raise ValueError(f"is {value!r}, expected numbers")
     try:

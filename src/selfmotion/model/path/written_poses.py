@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, plain_numbers
 from selfmotion.model.path.base import path_pose
 from selfmotion.model.task import SE3, Quaternion, exp3, rpy
 
@@ -100,10 +100,9 @@ def pose_of(value: Any) -> SE3:
 def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     """Return finite numbers of that shape; ValueError otherwise."""
     size = " × ".join(map(str, shape))
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (OverflowError, TypeError, ValueError):
-        raise ValueError(f"{what} is {value!r}, expected {size} numbers") from None
+    array = plain_numbers(value)
+    if array is None:
+        raise ValueError(f"{what} is {value!r}, expected {size} numbers")
     if array.shape != shape or not np.all(np.abs(array) < _MAX_ABS_VALUE):
         raise ValueError(f"{what} is {value!r}, expected {size} finite numbers")
     return array
