@@ -6,7 +6,7 @@
 `files`     files, read and written whole or not at all; digests
 `intervals` places among increasing numbers, compiled
 `jit`       numerical kernels, compiled by numba once per machine
-`progress`  what is told while something runs, and interruption
+`progress`  reports while something runs, and interruption
 `saved`     classes that describe themselves in files, and are restored by their kind
 `series`    majorants: bounds of all derivatives of a function on intervals of time
 `tables`    documents (TOML, JSON, YAML) and tables, in SI units

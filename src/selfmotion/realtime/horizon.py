@@ -259,7 +259,7 @@ class Horizon:
         self.breakdown = self.damped = float(np.inf)
 
     def start_anew(self) -> None:
-        """Restart after a failure, which is still told."""
+        """Restart after a failure, which is still reported."""
         when = self.breakdown
         self.forget()
         self.breakdown = when

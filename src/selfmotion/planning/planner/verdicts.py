@@ -31,7 +31,7 @@ def judge_incumbent(planner: Planner, incumbent: Solution) -> None:
         # An iterate on the way to an optimum may violate more than earlier motions.
         known += [planner.runner_up, Solution.of(best.guess)]
     for one in filter(None, known):
-        # What was evaluated is told, whichever motion it led to.
+        # What was evaluated is reported, whichever motion it led to.
         told = replace(one, history=one.history or best.history)
         if judge_as_it_is(planner, told.ended_by(best.status) if best.cut_short else told):
             return

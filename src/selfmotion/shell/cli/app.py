@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _WORTH_SAYING = 2.0
 # A log has a line at least this often [s], which is looked at in between.
 _SILENT, _TICK = 10.0, 1.0
-# Stages as they are told to callbacks → in words, where they are not already.
+# Stages as callbacks receive them → in words, where they are not already.
 _IN_WORDS = {
     "start": "optimising start",
     "branch": "looking for another branch of inverse kinematics, try",

@@ -216,7 +216,7 @@ def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
     Raises
     ------
     ProblemError
-        None is; the last one's reason is told.
+        None is; the last one's reason is reported.
     """
     reason = ""
     for text in texts:

@@ -118,7 +118,7 @@ class _Files:
     parts, force : bool
         Whether there is a file for each part; and whether all is written that is not verified.
     whole : bool
-        Whether verdicts are told whole.
+        Whether verdicts are printed whole.
     """
 
     targets: tuple[Path, ...]

@@ -30,7 +30,7 @@ _OFF = np.array([1e-4, 1e-3])
 # Rounding of limits that are used in full.
 _FULL = 1.0 + 1e-9
 _LIMITS = ("position", "speed", "acceleration")
-# So many times of being off the path are told one by one.
+# Number of times off the path that are reported one by one.
 _TOLD = 5
 
 
@@ -75,7 +75,7 @@ def loop_of(document: Mapping[str, Any], file: Path) -> Loop:
     """Return the loop of a document; FileFormatError for a number that is too small."""
     values = document.get("loop", {})
     known = {field.name for field in fields(Loop)}
-    # Others are told where the document is checked.
+    # Others are reported where the document is checked.
     given = {name: value for name, value in values.items() if name in known}
     for name, value in given.items():
         least = _MIN_TIMES.get(name, 0.0)
@@ -93,8 +93,8 @@ class Link:
     A state is [t, q, q̇]; the path begins with the first one. A segment is a row [t, q, q̇, q̈] for
     each cycle, in the clock of the states. An empty datagram ends it. Segments go to where the
     first state came from; what comes from elsewhere, is of another length, or older than the last
-    state, is left out, and lengths that are wrong are told at once. Of several states that wait the
-    newest counts.
+    state, is left out, and lengths that are wrong are reported at once. Of several states that wait
+    the newest counts.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Link:
     limits : (4, n)
         Lower, upper, speed, acceleration of the joints.
     tell : callable
-        What is told while it runs.
+        Receives messages while it runs.
     loop : Loop
     """
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from selfmotion.work.batch import Batch, Row
 
 
-# Moves that are told to take longest.
+# Number of longest moves that are reported.
 _LONGEST = 5
 # Columns of a log, which has no width of its own: those of the widest table.
 _LOG_WIDTH = 120
@@ -74,7 +74,7 @@ def show(plan: Plan, console: Console) -> None:
         console.print(metres_text(plan), markup=False, soft_wrap=not console.is_terminal)
 
 
-# A look at single poses, starts, and the proof: what more was tried is told.
+# A look at single poses, starts, and the proof: what more was tried is reported.
 _USUAL_ATTEMPTS = 3
 
 

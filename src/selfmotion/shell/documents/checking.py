@@ -12,7 +12,7 @@ from selfmotion.shell.documents.one_of import all_tables, unknown_key
 from selfmotion.shell.documents.tables import Table, checks
 
 _Model = TypeVar("_Model", bound=Table)
-# Faults of a file that are told at once.
+# Faults of a file that are reported at once.
 _TOLD = 3
 # What has an ending of a key as its unit.
 _MEASURES = {"deg": "angle", "mm": "length"}
@@ -55,7 +55,7 @@ def _message(error: ValidationError, model: type[Table], raw: Mapping[str, Any])
 
 
 def _place(location: tuple[int | str, ...], raw: Mapping[str, Any]) -> str:
-    """Return ``costs[1].weight`` for the way to a value; a seam is told by its name."""
+    """Return ``costs[1].weight`` for the way to a value; a seam has its name."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     match location:
         case ["seams", int() as number, *_]:

@@ -55,7 +55,7 @@ class OneOf:
     def _read(self, value: Any, refuse: Callable[[Any], Any]) -> Any:
         name = value.get(self._tag) if isinstance(value, Mapping) else None
         if isinstance(name, str):
-            # Chosen here, so that errors are told without the kind in the way to a key.
+            # Chosen here, so that errors come without the kind in the way to a key.
             if name in (known := self.by_name()):
                 return known[name].model_validate(value)
             cls = self._classes().get(name)

@@ -47,7 +47,7 @@ class SeamJob:
             try:
                 problem = self._problem(seam)
             except SelfmotionError:
-                # It is told why when the seam is planned.
+                # The reason is reported when the seam is planned.
                 continue
             for remark in problem.remarks:
                 remarks.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")

@@ -196,7 +196,7 @@ class Context:
     degrees_key : str
         A key of the document that gives degrees joint by joint; "" for none.
     where : str
-        Of which part of the document errors are told, such as a seam; "" for none.
+        The part of the document that errors name, such as a seam; "" for none.
     """
 
     file: FilePath | None

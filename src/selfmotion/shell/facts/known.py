@@ -14,7 +14,7 @@ from selfmotion.work.margins import Margins
 
 # Samples at which a power is measured.
 _SAMPLES = 400
-# Moves that are told to take longest.
+# Number of longest moves that are reported.
 _LONGEST = 3
 
 

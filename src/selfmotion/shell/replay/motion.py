@@ -295,7 +295,7 @@ def clearance_curve(
 # Times of a motion at which the arm is moved along its self-motion; steps to either side of it, and
 # how far the chosen joint turns in each [rad or m].
 _TIMES, _STEPS, _STEP = 41, 10, 0.1
-# How far links go is told by steps so short [rad or m].
+# How far links go is measured in steps so short [rad or m].
 _SHORT = 1e-3
 # What a step may move any joint by, as a multiple of it: beyond, it is another branch.
 _FAR = 8.0

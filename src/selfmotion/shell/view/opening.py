@@ -17,7 +17,7 @@ from selfmotion.work.job import Program, load_program
 
 # What nothing asks for is of no document.
 _NOTHING = Request(0, {})
-# So many steps that are not verified are told.
+# Number of steps that are not verified and are named.
 _TOLD = 3
 
 

@@ -34,7 +34,7 @@ from selfmotion.shell.view.placement_map import PlacementMap
 from selfmotion.shell.view.requests import NewerRequest, Outcome, Request
 from selfmotion.work.job import Program
 
-# What takes longer is told where nothing else is asked for in this time [s].
+# What takes longer is reported where nothing else is asked for in this time [s].
 _CALM = 0.25
 # So many arms are kept for documents to come: one for each place of a base that is dragged.
 _KEPT = 16

@@ -1,4 +1,4 @@
-"""What the page is told: plans as it draws them, with handles, sliders, and what stops them."""
+"""What the page receives: plans as it draws them, with handles, sliders, and what stops them."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -139,7 +139,7 @@ def plan_job(
     ------
     FeedError
         A seam asks for a feed that its path cannot have; before anything is planned. Of several
-        the slowest one is told: where all ask for one feed, what is possible there is for all.
+        the slowest one is named: where all ask for one feed, what is possible there is for all.
     PlanError
         No seam has a motion; `DeadlineError` where the deadline came before there was a program.
     ProblemError

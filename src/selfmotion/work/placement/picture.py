@@ -196,7 +196,7 @@ class _Drawing:
 
 
 def unit_of(name: str) -> str:
-    """Return the unit in which a coordinate is told."""
+    """Return the unit in which a coordinate is shown."""
     return "mm" if name in LENGTHS else "°"
 
 
