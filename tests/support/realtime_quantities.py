@@ -19,51 +19,70 @@ ROUNDED, SAME = 1e-9, 1e-12
 # What is exceeded at first may grow by this share once, see `QUANTITY_BEYOND`.
 GROWS = 1e-4
 
-Share = Callable[[Array, Array, Array], float]
+# Shares of a limit that a motion (K, n) uses: from q, q̇ and q̈ to (K,).
+Shares = Callable[[Array, Array, Array], Array]
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _TOOL = "panda_hand_tcp"
 _FORCES = np.array([40.0, 60.0, 30.0, 30.0, 5.0, 5.0, 5.0])
 _SPEED, _ACCELERATION = 0.4, 3.0
 
 
-def torque(model: pin.Model, data: pin.Data) -> Share:
-    return lambda q, qd, qdd: float((np.abs(pin.rnea(model, data, q, qd, qdd)) / _FORCES).max())
+def torque(model: pin.Model, data: pin.Data) -> Shares:
+    def shares(q: Array, qd: Array, qdd: Array) -> Array:
+        torques = [pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)]
+        return (np.abs(torques) / _FORCES).max(axis=1)
+
+    return shares
 
 
-def tilt(model: pin.Model, data: pin.Data) -> Share:
-    def share(q: Array, qd: Array, qdd: Array) -> float:
+def tilt(model: pin.Model, data: pin.Data) -> Shares:
+    tool = model.getFrameId(_TOOL)
+
+    def height_of_axis(q: Array) -> float:
         pin.framesForwardKinematics(model, data, q)
-        down = data.oMf[model.getFrameId(_TOOL)].rotation[:, 2] @ np.array([0.0, 0.0, -1.0])
-        return float(np.arccos(np.clip(down, -1.0, 1.0))) / 0.3
+        return float(data.oMf[tool].rotation[2, 2])
 
-    return share
+    def shares(q: Array, qd: Array, qdd: Array) -> Array:
+        down = -np.array([height_of_axis(each) for each in q])
+        return np.arccos(np.clip(down, -1.0, 1.0)) / 0.3
+
+    return shares
 
 
-def elbow(model: pin.Model, data: pin.Data) -> Share:
-    def share(q: Array, qd: Array, qdd: Array) -> float:
+def elbow(model: pin.Model, data: pin.Data) -> Shares:
+    def places(q: Array) -> list[Array]:
         pin.forwardKinematics(model, data, q)
-        shoulder, middle, wrist = (data.oMi[k].translation for k in (2, 4, 6))
-        axis = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
-        arm, up = middle - shoulder, np.array([0.0, 0.0, 1.0])
-        arm, up = arm - axis * (axis @ arm), up - axis * (axis @ up)
-        return abs(float(np.arctan2(axis @ np.cross(up, arm), up @ arm))) / 0.4
+        return [data.oMi[k].translation.copy() for k in (2, 4, 6)]
 
-    return share
+    def shares(q: Array, qd: Array, qdd: Array) -> Array:
+        shoulder, middle, wrist = np.array([places(each) for each in q]).transpose(1, 0, 2)
+        axis = wrist - shoulder
+        axis /= np.linalg.norm(axis, axis=1)[:, None]
+        arm, up = middle - shoulder, np.array([[0.0, 0.0, 1.0]])
+        arm, up = (x - axis * (axis * x).sum(axis=1)[:, None] for x in (arm, up))
+        sine, cosine = (axis * np.cross(up, arm)).sum(axis=1), (up * arm).sum(axis=1)
+        return np.abs(np.arctan2(sine, cosine)) / 0.4
+
+    return shares
 
 
-def tool(model: pin.Model, data: pin.Data) -> Share:
-    def share(q: Array, qd: Array, qdd: Array) -> float:
-        pin.forwardKinematics(model, data, q, qd, qdd)
-        at = model.getFrameId(_TOOL)
+def tool(model: pin.Model, data: pin.Data) -> Shares:
+    at = model.getFrameId(_TOOL)
+
+    def rates(*state: Array) -> tuple[Array, Array]:
+        pin.forwardKinematics(model, data, *state)
         pin.updateFramePlacement(model, data, at)
         speed = pin.getFrameVelocity(model, data, at, _AXES).linear
-        faster = pin.getFrameClassicalAcceleration(model, data, at, _AXES).linear
-        return max(np.linalg.norm(speed) / _SPEED, np.linalg.norm(faster) / _ACCELERATION)
+        return speed, pin.getFrameClassicalAcceleration(model, data, at, _AXES).linear
 
-    return share
+    def shares(q: Array, qd: Array, qdd: Array) -> Array:
+        both = np.array([rates(*state) for state in zip(q, qd, qdd, strict=True)])
+        return (np.linalg.norm(both, axis=2) / [_SPEED, _ACCELERATION]).max(axis=1)
+
+    return shares
 
 
-KINDS: dict[str, tuple[Callable[[], sm.constraints.Constraint], Callable[..., Share]]] = {
+KINDS: dict[str, tuple[Callable[[], sm.constraints.Constraint], Callable[..., Shares]]] = {
     "torque": (lambda: sm.constraints.JointTorqueLimits(_FORCES), torque),
     "tilt": (lambda: sm.constraints.Tilt(_TOOL, within=0.3), tilt),
     "elbow": (lambda: sm.constraints.Band.of_elbow("up", 0.4), elbow),
@@ -119,13 +138,13 @@ def is_rest(segment: Segment) -> bool:
 def exceeded(kind: str, found: list[Segment]) -> float:
     """Return by which share of the limit segments exceed it, but for the rests of others."""
     model = robot_named("panda").model
-    share, worst = KINDS[kind][1](model, model.createData()), -1.0
+    shares, worst = KINDS[kind][1](model, model.createData()), -1.0
     for segment in found:
         assert np.all(segment.qd[-1] == 0.0)
         if not is_rest(segment):
-            each = [share(*state) for state in zip(*motion_between_cycles(segment), strict=True)]
-            most = 1.0 if each[0] <= 1.0 else each[0] + GROWS
-            worst = max(worst, max(each) - most)
+            used = shares(*motion_between_cycles(segment))
+            most = 1.0 if used[0] <= 1.0 else used[0] + GROWS
+            worst = max(worst, float(used.max() - most))
     return worst
 
 
