@@ -24,12 +24,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, Progress, series, silent
+from selfmotion.basics import Array, Flags, Ints, Progress, series, silent
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ChainSeries, RobotModel
 
 # Nodes of an interval are multiples of this: few numbers, of which each takes a pass of its own.
 _NODES_STEP = 3
+# Fewer intervals than these take the next larger number of nodes: a pass takes longer.
+_FEW = 16
 # Nodes of an interval without a majorant.
 _MEASURED = 9
 # Points of an interval at which polynomials are evaluated.
@@ -251,8 +253,20 @@ def _nodes(known: Array, function: BoundedFunction) -> tuple[Ints, Array]:
     usable = (errors[:, -1] <= 0.5 * limits[:, None]).all(axis=0)
     enough = good.any(axis=0)
     which = np.where(enough, np.argmax(good, axis=0), np.where(usable, len(powers) - 1, 0))
+    which = _with_others(which, np.asarray(enough))
     rest = np.take_along_axis(errors, which[None, None], axis=1)[:, 0]
     return powers[which], np.where(enough | usable, rest, np.inf)
+
+
+def _with_others(which: Ints, enough: Flags) -> Ints:
+    """Return the index of each interval's number of nodes; a few of one go with those of more."""
+    counts = np.bincount(which[enough], minlength=1)
+    for number in range(len(counts) - 1):
+        if 0 < counts[number] < _FEW:
+            larger = number + 1 + int(np.argmax(counts[number + 1 :] > 0))
+            which = np.where(enough & (which == number), larger, which)
+            counts[larger] += counts[number]
+    return which
 
 
 def _interpolated(
@@ -261,18 +275,25 @@ def _interpolated(
     """Return bounds, about when, and measured sizes (I, G) by polynomials through nodes."""
     u, places, into, between, bends = _matrices(count)
     values = function.values(segments, u)
-    coefficients = np.einsum("kp,ipc->ikc", into, values)
+    coefficients = _times(into, values)
     lengths = _lengths(coefficients, function.blocks)
     if np.isnan(rest).all():
         rest = 2.0 * lengths[:, -2:].sum(axis=1).T
-    left = rest.T + np.einsum("k,ikb->ib", bends, lengths)
-    dense = function.sizes(np.einsum("pk,ikc->ipc", between, coefficients), segments)
+    left = rest.T + bends @ lengths
+    dense = function.sizes(_times(between, coefficients), segments)
     measured = function.sizes(values, segments).max(axis=1)
     which = np.argmax(np.where(np.isnan(dense), np.inf, dense), axis=1)
     times = segments.times(places)
     rows = np.arange(len(times))[:, None]
     bounds = dense[rows, which, np.arange(dense.shape[2])] + left[:, function.of]
     return bounds, times[rows, which], measured
+
+
+def _times(matrix: Array, values: Array) -> Array:
+    """Return the product of a matrix (L, K) with values (I, K, C) of intervals, (I, L, C)."""
+    count, nodes, components = values.shape
+    columns = values.transpose(1, 0, 2).reshape(nodes, -1)
+    return (matrix @ columns).reshape(-1, count, components).transpose(1, 0, 2)
 
 
 def _lengths(vectors: Array, blocks: Ints) -> Array:

@@ -16,19 +16,20 @@ from selfmotion.model.path import Path, path_series
 from selfmotion.model.robot import WORLD, Chain, RobotModel
 from selfmotion.model.task import Relaxation, Task
 
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 # Singular value below which it is not taken from an eigenvalue: above, it is right to 1e-12.
 _NEAR_SINGULAR = 1e-3
 
 
-def deviation_from(follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool) -> Array:
+def deviation_from(
+    follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool, *, compiled: bool = False
+) -> Array:
     """Return the deviation of the tool from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
-    free.
+    free. The tool is where Pinocchio has it, or the `compiled` kinematics of planners.
     """
     task = follow.task
-    rotation, translation = poses(follow.chain, q)
+    rotation, translation = follow.chain.along(q)[1:] if compiled else poses(follow.chain, q)
     target = follow.path.samples(t)
     linear = task.rows[task.rows < 3]
     deviation_rows = np.zeros((len(t), 6))
@@ -58,28 +59,45 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     """Return Jacobians (K, 6, n) of the tip and its orientations, in the base's axes."""
     model, data = chain.model, chain.model.createData()
     frames = [chain.tip] if chain.base == WORLD else [chain.tip, chain.base]
-    world = np.empty((len(frames), len(q), 6, model.nv))
+    # [v, ω] of all joints, v at the world's origin.
+    twists = np.empty((len(q), 6, model.nv))
     turns, places = np.empty((len(frames), len(q), 3, 3)), np.empty((len(frames), len(q), 3))
-    placed = [data.oMf[frame] for frame in frames]
-    # Views of data that each placement overwrites.
-    seen = [(pose.rotation, pose.translation) for pose in placed]
+    # Views of data that each configuration overwrites.
+    seen = [(pose.rotation, pose.translation) for pose in (data.oMf[frame] for frame in frames)]
+    seen_twists = data.J.reshape(6, -1)
     coupling = chain.coupling
     for k, configuration in enumerate(q @ coupling.matrix.T + coupling.offsets):
         pin.computeJointJacobians(model, data, configuration)
+        twists[k] = seen_twists
         for f, frame in enumerate(frames):
             pin.updateFramePlacement(model, data, frame)
-            world[f, k] = pin.getFrameJacobian(model, data, frame, _AXES).reshape(6, -1)
             turns[f, k], places[f, k] = seen[f]
-    world = world @ coupling.matrix
-    if chain.base == WORLD:
-        return world[0], turns[0]
-    own, other = world
-    offset, turned = places[0] - places[1], turns[1].transpose(0, 2, 1)
-    moving = other[:, :3] + np.cross(other[:, 3:], offset[:, :, None], axis=1)
+    own, *bases = (
+        _at_frame(model, frame, twists, place) @ coupling.matrix
+        for frame, place in zip(frames, places, strict=True)
+    )
+    if not bases:
+        return own, turns[0]
+    other, turned = bases[0], turns[1].transpose(0, 2, 1)
+    moving = _shifted(other, places[0] - places[1])
     jacobian = np.concatenate(
         [turned @ (own[:, :3] - moving), turned @ (own[:, 3:] - other[:, 3:])], 1
     )
     return jacobian, turned @ turns[0]
+
+
+def _at_frame(model: pin.Model, frame: int, twists: Array, places: Array) -> Array:
+    """Return the Jacobians (K, 6, m) of a frame at places (K, 3) by twists of all joints."""
+    joints = list(model.supports[model.frames[frame].parentJoint])[1:]
+    moves = np.zeros(model.nv)
+    moves[[model.idx_vs[joint] for joint in joints]] = 1.0
+    return np.asarray(np.concatenate([_shifted(twists, places), twists[:, 3:]], axis=1) * moves)
+
+
+def _shifted(twists: Array, offsets: Array) -> Array:
+    """Return v + ω × p of twists (K, 6, m) at offsets p (K, 3), (K, 3, m)."""
+    (x, y, z), (a, b, c) = offsets.T[:, :, None], twists[:, 3:].transpose(1, 0, 2)
+    return np.asarray(twists[:, :3] + np.stack([b * z - c * y, c * x - a * z, a * y - b * x], 1))
 
 
 def poses(chain: Chain, q: Array) -> tuple[Array, Array]:
@@ -251,9 +269,12 @@ def errors_between(
 def errors_at(
     follow: BoundTaskFrame, t: Array, q: Array, relaxations: Sequence[Relaxation]
 ) -> Array:
-    """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad]."""
+    """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad].
+
+    By the compiled kinematics of planners: no proof.
+    """
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    deviation_rows = deviation_from(follow, t, q, in_tool_axes)
+    deviation_rows = deviation_from(follow, t, q, in_tool_axes, compiled=True)
     beyond = excess(relaxations, follow.path.duration, t, deviation_rows)
     return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 

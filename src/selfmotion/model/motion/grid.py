@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, read_only
+from selfmotion.basics import Array, Ints, read_only
 
 # Nodes in a finite-difference stencil.
 _STENCIL = 5
@@ -83,14 +83,18 @@ class Sampling:
 def _differentiation(nodes: Array, times: Array, order: int) -> Any:
     from scipy.sparse import csr_array
 
-    count = min(_STENCIL, len(nodes))
-    nearest = np.searchsorted(nodes, times) - count // 2
-    first = np.clip(nearest, 0, len(nodes) - count)
-    columns = first[:, None] + np.arange(count)
-    weights = _fornberg(nodes[columns] - times[:, None], order)
-    rows = np.repeat(np.arange(len(times)), count)
+    columns, weights = _stencils(nodes, times, order)
+    rows = np.repeat(np.arange(len(times)), columns.shape[1])
     shape = (len(times), len(nodes))
     return csr_array((weights.ravel(), (rows, columns.ravel())), shape=shape)
+
+
+def _stencils(nodes: Array, times: Array, order: int) -> tuple[Ints, Array]:
+    """Return the nodes that a derivative at times (S,) is taken from, and weights, (S, k) each."""
+    count = min(_STENCIL, len(nodes))
+    nearest = np.searchsorted(nodes, times) - count // 2
+    columns = np.clip(nearest, 0, len(nodes) - count)[:, None] + np.arange(count)
+    return columns, _fornberg(nodes[columns] - times[:, None], order)
 
 
 def _fornberg(offsets: Array, order: int) -> Array:
@@ -166,7 +170,8 @@ class Grid:
 
     def derivative(self, values: Array) -> Array:
         """Return the derivative at the nodes of a function with these values (N + 1, n) there."""
-        return np.asarray(self.sampling.differentiation(1)[self.node_stages] @ values)
+        columns, weights = _stencils(self.nodes, self.nodes, 1)
+        return np.asarray((weights[:, None, :] @ values[columns])[:, 0])
 
     @cached_property
     def weights(self) -> Array:

@@ -97,6 +97,10 @@ def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
     degree, count = len(monic) - 1, monic.shape[1]
     if degree == 1:
         return -monic[:1] + 0.0j
+    if degree == 2:
+        middle = -0.5 * monic[1]
+        apart = np.sqrt(middle**2 - monic[0] + 0.0j)
+        return np.stack([middle - apart, middle + apart])
     companion = np.zeros((count, degree, degree))
     companion[:, 1:, :-1] = np.eye(degree - 1)
     companion[:, :, -1] = -monic[:-1].T

@@ -244,23 +244,29 @@ class Trajectory:
         values = np.tile(self._spline.segments(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
         for k in self._spline.chunks():
             segments = self._spline.segments(k, order)
-            ends = np.stack([segments[0], segments.sum(axis=0)])
-            least = np.minimum(ends.min(axis=(0, 1)), values[0])
-            largest = np.maximum(ends.max(axis=(0, 1)), values[1])
+            ends = np.concatenate([values, segments[0], segments.sum(axis=0)])
+            both = np.stack([ends.argmin(axis=0), ends.argmax(axis=0)])
+            starts = np.concatenate([self.t[:2], self.t[k], self.t[k + 1]])
+            before = t[np.minimum(both, 1), joints]
+            t, values = np.where(both < 2, before, starts[both]), ends[both, joints]
             # Inner extrema only where the Bernstein hull of a polynomial exceeds all ends.
-            some, of = np.nonzero(may_pass(segments, least, largest))
+            some, of = np.nonzero(may_pass(segments, *values))
             chosen = segments[:, some, of]
             roots = inner_roots(differentiated(chosen))
-            # Elsewhere the start again.
-            inner = np.tile(ends[0], (len(roots), 1, 1))
-            within = np.tile(self.t[k][:, None], (len(roots), 1, len(joints)))
-            inner[:, some, of] = evaluated(chosen, roots)
-            within[:, some, of] += (self.t[k + 1] - self.t[k])[some] * roots
-            found = np.concatenate([values, *ends, *inner])
-            when = np.broadcast_to(np.stack([self.t[k], self.t[k + 1]])[:, :, None], ends.shape)
-            times = np.concatenate([t, *when, *within])
-            both = np.stack([found.argmin(axis=0), found.argmax(axis=0)])
-            t, values = times[both, joints], found[both, joints]
+            inner = evaluated(chosen, roots)
+            for joint in np.unique(of):
+                own = of == joint
+                first = k[some[own]]
+                within = self.t[first] + (self.t[first + 1] - self.t[first]) * roots[:, own]
+                found = inner[:, own].ravel()
+                for side, best in enumerate((found.argmin(), found.argmax())):
+                    # Rising above the largest, or falling below the least.
+                    if (
+                        (found[best] > values[1, joint])
+                        if side
+                        else (found[best] < values[0, joint])
+                    ):
+                        values[side, joint], t[side, joint] = found[best], within.flat[best]
         return read_only(t), read_only(values)
 
     def acceleration_jumps(self) -> tuple[Array, Array]:
