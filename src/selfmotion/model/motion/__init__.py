@@ -1,5 +1,6 @@
 """The nouns of a joint motion over time: grid, trajectory, null motion."""
 
+from selfmotion.model.motion.differences import Differences as Differences
 from selfmotion.model.motion.grid import Grid as Grid, Sampling as Sampling
 from selfmotion.model.motion.null_motion import (
     BSplineNullMotion as BSplineNullMotion,

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, read_only
+from selfmotion.basics import Array, read_only
+from selfmotion.model.motion.differences import Differences
 
-# Nodes in a finite-difference stencil.
-_STENCIL = 5
 # Relative rounding allowance, so that an exact division into steps is not rounded up.
 _ROUNDING = 1e-9
 
@@ -54,7 +53,7 @@ class Sampling:
     def differentiation(self, order: int) -> Any:
         """Return the sparse matrix (S, N + 1) from values at the nodes to a derivative at samples.
 
-        Five-point finite differences (weights of B. Fornberg, Math. Comp. 51, 1988).
+        Five-point finite differences; see `Differences`.
 
         Parameters
         ----------
@@ -83,31 +82,13 @@ class Sampling:
 def _differentiation(nodes: Array, times: Array, order: int) -> Any:
     from scipy.sparse import csr_array
 
-    columns, weights = _stencils(nodes, times, order)
-    rows = np.repeat(np.arange(len(times)), columns.shape[1])
-    shape = (len(times), len(nodes))
-    return csr_array((weights.ravel(), (rows, columns.ravel())), shape=shape)
-
-
-def _stencils(nodes: Array, times: Array, order: int) -> tuple[Ints, Array]:
-    """Return the nodes that a derivative at times (S,) is taken from, and weights, (S, k) each."""
-    count = min(_STENCIL, len(nodes))
-    nearest = np.searchsorted(nodes, times) - count // 2
-    columns = np.clip(nearest, 0, len(nodes) - count)[:, None] + np.arange(count)
-    return columns, _fornberg(nodes[columns] - times[:, None], order)
-
-
-def _fornberg(offsets: Array, order: int) -> Array:
-    """Return weights (S, k) of the derivative at 0 from values at `offsets` (S, k).
-
-    Exact for polynomials of degree < k: a small Vandermonde system, scaled against rounding.
-    """
-    scale = np.abs(offsets).max(axis=1, keepdims=True)
-    powers = np.arange(offsets.shape[1])
-    vandermonde = (offsets / scale)[:, None, :] ** powers[None, :, None]
-    target = np.zeros((len(offsets), len(powers), 1))
-    target[:, order, 0] = float(np.prod(np.arange(1, order + 1))) / scale[:, 0] ** order
-    return np.asarray(np.linalg.solve(vandermonde, target)[:, :, 0])
+    found = Differences(nodes, times)
+    count, width = found.weights.shape[1:]
+    columns = found.first[:, None] + np.arange(width)
+    rows = np.repeat(np.arange(count), width)
+    return csr_array(
+        (found.weights[order].ravel(), (rows, columns.ravel())), shape=(count, len(nodes))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +151,7 @@ class Grid:
 
     def derivative(self, values: Array) -> Array:
         """Return the derivative at the nodes of a function with these values (N + 1, n) there."""
-        columns, weights = _stencils(self.nodes, self.nodes, 1)
-        return np.asarray((weights[:, None, :] @ values[columns])[:, 0])
+        return Differences(self.nodes)(values)[0]
 
     @cached_property
     def weights(self) -> Array:

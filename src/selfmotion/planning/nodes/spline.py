@@ -15,8 +15,7 @@ from math import comb, perm
 import numpy as np
 
 from selfmotion.basics import Array, Ints
-from selfmotion.model.motion import Sampling
-from selfmotion.planning.nodes.differences import Differences
+from selfmotion.model.motion import Differences, Sampling
 from selfmotion.planning.nodes.node_matrix import EndChanges
 
 # Orders of derivatives: q, q̇, q̈ and the jerk.
