@@ -175,10 +175,11 @@ def test_room_is_a_share_of_a_limit() -> None:
 def test_rows_are_added_with_their_neighbours() -> None:
     """As far as there are limits: twenty to both sides."""
     room = np.ones((60, 2))
-    room[30, 0] = -1.0
+    room[[30, 35], 0] = -1.0
     room[32, 0] = np.inf
-    found = banded._with_neighbours(room, np.zeros((60, 1)))
+    found = np.zeros((60, 2), dtype=bool)
+    banded._choose(room, np.zeros(60), found)
     expected = np.zeros((60, 2), dtype=bool)
-    expected[30 - banded._NEIGHBOURS : 31 + banded._NEIGHBOURS, 0] = True
+    expected[30 - banded._NEIGHBOURS : 36 + banded._NEIGHBOURS, 0] = True
     expected[32, 0] = False
     np.testing.assert_array_equal(found, expected)

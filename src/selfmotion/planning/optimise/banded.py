@@ -349,14 +349,6 @@ class BandedRows:
     lower: Array
     upper: Array
 
-    def times(self, c: Array) -> Array:
-        """Return R c of unknowns c (K + 2,), (K, M)."""
-        count = self.matrix.shape[1]
-        found: Array = self.matrix[0] * c[:count, None]
-        for k in range(1, WIDTH):
-            found += self.matrix[k] * c[k : count + k, None]
-        return found
-
 
 def banded_optimum(
     gradient: Array, rows: BandedRows, start: Array, least: Array, most: Array, gap: float = 1e-6
@@ -385,32 +377,53 @@ def banded_optimum(
         if not reached or min(float(side.min(initial=0.0)) for side in room) >= -_VIOLATED:
             break
         # Where rows are far beyond their limits, those farthest beyond stand for the others.
-        worst = np.minimum(*(side.min(axis=1, initial=0.0) for side in room))[:, None]
+        worst = np.minimum(*(side.min(axis=1, initial=0.0) for side in room))
         near = np.where(worst < -_ROOM_LATER, _SHARE_OF_WORST * worst, _ROOM_LATER)
-        chosen = (
-            chosen[0] | _with_neighbours(room[0], near),
-            chosen[1] | _with_neighbours(room[1], near),
-        )
+        for side, rows_of_side in zip(room, chosen, strict=True):
+            _choose(side, near, rows_of_side)
     return c, reached
-
-
-def _with_neighbours(room: Array, near: Array) -> Flags:
-    """Return rows (K, M) with less room than `near`, and their neighbours."""
-    rows = room < near
-    wide = rows.copy()
-    for k in range(1, _NEIGHBOURS + 1):
-        wide[k:] |= rows[:-k]
-        wide[:-k] |= rows[k:]
-    return np.asarray(wide & np.isfinite(room))
 
 
 def _room(rows: BandedRows, c: Array) -> tuple[Array, Array]:
     """Return the room of rows to `upper` and `lower`, relative to these, (K, M) each."""
-    reached, sides = rows.times(c), []
-    for sign, limit in ((1.0, rows.upper), (-1.0, rows.lower)):
-        size = np.where(np.isfinite(limit), np.maximum(np.abs(limit), 1.0), 1.0)
-        sides.append(sign * (limit - reached) / size)
-    return sides[0], sides[1]
+    above, below = np.empty_like(rows.upper), np.empty_like(rows.lower)
+    _set_room(rows.matrix, rows.lower, rows.upper, c, above, below)
+    return above, below
+
+
+@kernel
+def _set_room(
+    matrix: Array, lower: Array, upper: Array, c: Array, above: Array, below: Array
+) -> None:
+    """Set the room of rows R c to both limits, relative to these or 1 if that is larger."""
+    width, count, columns = matrix.shape
+    for k in range(count):
+        for m in range(columns):
+            value = 0.0
+            for i in range(width):
+                value += matrix[i, k, m] * c[k + i]
+            above[k, m], below[k, m] = upper[k, m] - value, value - lower[k, m]
+            if np.isfinite(upper[k, m]):
+                above[k, m] /= max(abs(upper[k, m]), 1.0)
+            if np.isfinite(lower[k, m]):
+                below[k, m] /= max(abs(lower[k, m]), 1.0)
+
+
+@kernel
+def _choose(room: Array, near: Array, chosen: Flags) -> None:
+    """Choose rows (K, M) with less room than `near` (K,), and their neighbours, but those without.
+
+    Without a limit their room is infinite.
+    """
+    count, columns = room.shape
+    for m in range(columns):
+        # Up to which place all are chosen.
+        until = 0
+        for k in range(count):
+            if room[k, m] < near[k]:
+                for i in range(max(k - _NEIGHBOURS, until), min(k + _NEIGHBOURS + 1, count)):
+                    chosen[i, m] = chosen[i, m] or np.isfinite(room[i, m])
+                until = min(k + _NEIGHBOURS + 1, count)
 
 
 def _solved(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,8 +40,16 @@ class Squares:
 
     def inside(self, share: float, order: int = 0) -> Array:
         """Return b, b' or b'' at a share of each interval, (K,)."""
+        value, slope, bend = self._starts
+        x = share * np.diff(self.knots)
+        parts = (value + x * (slope + 0.5 * x * bend), slope + x * bend, bend)
+        return np.asarray(parts[order])
+
+    @cached_property
+    def _starts(self) -> Array:
+        """b, b' and b'' at the start of each interval, (3, K)."""
         three = np.stack([self.c[:-2], self.c[1:-1], self.c[2:]])
-        return np.asarray((basis(self.knots, share)[order] * three).sum(axis=0))
+        return np.asarray((basis(self.knots, 0.0) * three).sum(axis=1))
 
     def at_knots(self, order: int = 0) -> Array:
         """Return b or b' at the knots, (K + 1,)."""
