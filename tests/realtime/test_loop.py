@@ -91,11 +91,11 @@ def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
         tracemalloc.start()
         try:
             t, q, sizes = 0.3, PANDA_HOME, []
-            for k in range(400):
+            for k in range(160):
                 segment = replanner.step(t, q, np.zeros(7), slow_circle)
                 t += replanner.period
                 q = segment.q[segment.index(t)]
-                if k % 100 == 99:
+                if k % 40 == 39:
                     gc.collect()
                     sizes.append(tracemalloc.get_traced_memory()[0])
         finally:

@@ -62,6 +62,19 @@ def test_the_proof_alone_stops_the_arm(kind: str, monkeypatch: pytest.MonkeyPatc
     assert any(is_rest(segment) and segment.flag is Flag.STOPPING for segment in found)
 
 
+@pytest.fixture(scope="module")
+def circle() -> sm.paths.Circle:
+    home = robot_named("panda").pose(PANDA_HOME)
+    return sm.paths.Circle.around(home, 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def free_along_circle(circle: sm.paths.Circle) -> list[sm.realtime.Segment]:
+    """Segments of a closed loop without constraints."""
+    free = Replanner(robot_named("panda"), "position")
+    return closed_loop(free, circle, PANDA_HOME, 3.0)[0]
+
+
 @pytest.mark.parametrize(
     ("constraint", "label"),
     [
@@ -72,15 +85,16 @@ def test_the_proof_alone_stops_the_arm(kind: str, monkeypatch: pytest.MonkeyPatc
     ],
 )
 def test_the_self_motion_keeps_a_quantity_and_the_tool_stays_on_its_path(
-    panda: sm.RobotModel, constraint: sm.constraints.Constraint, label: str
+    panda: sm.RobotModel,
+    circle: sm.paths.Circle,
+    free_along_circle: list[sm.realtime.Segment],
+    constraint: sm.constraints.Constraint,
+    label: str,
 ) -> None:
     """Of least joint speed alone it would be exceeded; then it binds, and the path is followed."""
-    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     quantity, worst = constraint.quantity(panda), []
-    for asked in ([], [constraint]):
-        segments, _ = closed_loop(
-            Replanner(panda, "position", constraints=asked), path, PANDA_HOME, 3.0
-        )
+    bound = Replanner(panda, "position", constraints=[constraint])
+    for segments in (free_along_circle, closed_loop(bound, circle, PANDA_HOME, 3.0)[0]):
         worst.append(max(largest_share(quantity, segment) for segment in segments))
         assert max(segment.tool_error[0] for segment in segments) < ON_PATH
         assert all(segment.flag is Flag.PLANNED for segment in segments)

@@ -188,16 +188,19 @@ def _exponentiate(a: Array, found: Array) -> None:
 def _compose(outer: Array, inner: Array, found: Array) -> None:
     """Set f(g - g₀) by Horner's scheme.
 
-    Each product shifts by at least one, so that the first ones need few terms.
+    Each product shifts by at least one, so that the first ones need few terms. Many outer series
+    are polynomials of a low degree, with zeros above.
     """
-    length = len(inner)
-    for left in range(len(outer) - 1, -1, -1):
+    length, last = len(inner), len(outer) - 1
+    while last > 0 and not outer[last].any():
+        last -= 1
+    for left in range(last, -1, -1):
         for k in range(max(length - left, 1) - 1, -1, -1):
-            for i in range(found.shape[1]):
-                total = 0.0
-                for j in range(1, k + 1):
-                    total += inner[j, i] * found[k - j, i]
-                found[k, i] = total
+            # One row after the other: neighbours in memory are neighbouring intervals.
+            found[k] = 0.0
+            for j in range(1, k + 1):
+                for i in range(found.shape[1]):
+                    found[k, i] += inner[j, i] * found[k - j, i]
         for i in range(found.shape[1]):
             found[0, i] += outer[left, i]
 
