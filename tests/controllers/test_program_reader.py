@@ -50,7 +50,7 @@ def test_a_motion_at_a_speed_takes_the_time_that_was_planned(
     (row,) = reader.rows
     assert row.seconds == [planned]
     assert reader.clock == planned
-    times = [switch.at for switch in reader.switches]
+    times = [switch.time for switch in reader.switches]
     assert 0.0 < times[0] < times[1] < planned
     # The second place is three quarters along the way.
     assert times[0] < 0.5 * planned < times[1]

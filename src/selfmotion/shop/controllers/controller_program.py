@@ -31,15 +31,15 @@ class Switch(NamedTuple):
 
     Attributes
     ----------
-    at : float
-        Time since the start of the motion [s].
+    time : float
+        Since the start of the motion [s].
     output : str
         Name of the output; of an event that is only a comment, its name.
     value : bool or None
         The new value; None for a comment.
     """
 
-    at: float
+    time: float
     output: str
     value: bool | None = None
 

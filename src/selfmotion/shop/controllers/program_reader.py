@@ -262,7 +262,7 @@ class ProgramReader:
         if self.run or ahead:
             self.happens.append((len(self.run) + ahead, switch))
         else:
-            self.switches.append(switch._replace(at=self.clock))
+            self.switches.append(switch._replace(time=self.clock))
 
     def approach(self, target: list[float] | Pose) -> None:
         """Take where the arm begins, or goes slowly before targets of the other kind."""
@@ -289,7 +289,7 @@ class ProgramReader:
         run, happens, self.run, self.happens = self.run, self.happens, [], []
         times = self._paced(run, is_spline=is_spline) if run[0].speed else self._timed(run)
         for number, switch in happens:
-            self.switches.append(switch._replace(at=self.clock + times[number]))
+            self.switches.append(switch._replace(time=self.clock + times[number]))
         self.clock += sum(self.rows[-1].seconds)
         self.here = run[-1].at
 
