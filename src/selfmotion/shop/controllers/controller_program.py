@@ -119,7 +119,7 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        return self._motion([next(own) for own in self._segment_motions(None)])
+        return self._motion([next(motions) for motions in self._segment_motions(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
         """Return the motions of a controller, one for each interpolation between targets.
@@ -184,13 +184,13 @@ class ControllerProgram:
                 )
             same = segment.in_order(order)
             operation = operations[min(k, len(operations) - 1)]
-            found = deviation_of(
+            deviation = deviation_of(
                 same, operation.motion, operation.chains, operation.motion.t[0] + elapsed
             )
             both = (
-                Deviations(NO_DEVIATION, found)
+                Deviations(NO_DEVIATION, deviation)
                 if operation.is_move
-                else Deviations(found, NO_DEVIATION)
+                else Deviations(deviation, NO_DEVIATION)
             )
             worst = worst.worse(both)
             elapsed += segment.duration

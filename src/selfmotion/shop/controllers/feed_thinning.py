@@ -97,7 +97,8 @@ class FeedSection(PoseSection):
                 "the feed itself): leave more room, or take a lower feed"
             )
             if not all(
-                part._has_timely_events(own) for part, own in zip(parts, feed_segments, strict=True)
+                part._has_timely_events(segment)
+                for part, segment in zip(parts, feed_segments, strict=True)
             ):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
             elif self._is_valid(feed_segments, travel, allowed):
@@ -154,8 +155,8 @@ class FeedSection(PoseSection):
         )
         planned = motion.t, motion.q, motion.qd
         whole = [
-            np.concatenate([own[before], *each, own[after]])
-            for own, each in zip(planned, zip(*rows, strict=True), strict=True)
+            np.concatenate([samples[before], *each, samples[after]])
+            for samples, each in zip(planned, zip(*rows, strict=True), strict=True)
         ]
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
         return self.operation.is_valid is not None and self.operation.is_valid(judged, allowed)
@@ -258,8 +259,8 @@ class FeedSection(PoseSection):
         times = times_at(positions, vias, speeds)
         far = np.append(0.0, np.cumsum(step_lengths(positions, vias)))
 
-        def near(own: Array) -> Array:
-            share = np.interp(own, times, far) / far[-1]
+        def near(step_times: Array) -> Array:
+            share = np.interp(step_times, times, far) / far[-1]
             return self._configurations_at(travel, share * travel.whole)
 
         events = [

@@ -141,8 +141,8 @@ class KrlReader(ProgramReader):
             self._begin_block(by_poses=True)
         if not self._by_poses:
             raise self.lines.fault("PTP_SPLINE has SPTP with times")
-        own = self.settings.get("speed", 0.0) if speed is None else speed
-        if not own > 0.0:
+        tool_speed = self.settings.get("speed", 0.0) if speed is None else speed
+        if not tool_speed > 0.0:
             raise self.lines.fault("a segment without a time, expected $VEL.CP before it")
         turning = {name: self.settings.get(name, UNBOUND_TURNING) for name in _TURNINGS}
         slow = [name for name, value in turning.items() if value < UNBOUND_TURNING]
@@ -151,7 +151,7 @@ class KrlReader(ProgramReader):
                 f"$VEL.{slow[0]} is {turning[slow[0]]:g}°/s, expected at least "
                 f"{UNBOUND_TURNING:g}: a slower one holds the tool back from its speed"
             )
-        self.run.append(Target(pose, speed=own, via=via))
+        self.run.append(Target(pose, speed=tool_speed, via=via))
         self._smooth.append(is_smooth)
         if alone:
             self.stop(is_spline=is_smooth)

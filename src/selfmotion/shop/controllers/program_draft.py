@@ -87,7 +87,7 @@ def drafted(
     happens = {event: item.name for item in operations for _, event in item.events}
     check_signals(happens, settings)
     slides = np.array([axis.slides for axis in axes])
-    given = operations, slides, settings.deviation, settings.move_deviation, progress
+    arguments = operations, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
     if settings.by_poses:
         of_path = settings.work_object == OF_PATH
@@ -102,12 +102,12 @@ def drafted(
             posed: PosedSections = partial(section, frames=frames, rounding=ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
-            segments, deviation = segments_of(*given, posed)
+            segments, deviation = segments_of(*arguments, posed)
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
         frames = None
-        segments, deviation = segments_of(*given)
+        segments, deviation = segments_of(*arguments)
     order = in_order(axes)
     sorted_ones = tuple(item.in_order(order) for item in segments)
     ordered = tuple(axes[k] for k in order)

@@ -124,26 +124,28 @@ class ProgramFacts:
     @classmethod
     def stated(cls, notes: Sequence[str]) -> "ProgramFacts | None":
         """Return those that the comments of a program state; None where they state none."""
-        said = {key: note.removeprefix(key) for note in notes for key in _FACTS if _is(note, key)}
+        statements = {
+            key: note.removeprefix(key) for note in notes for key in _FACTS if _is(note, key)
+        }
         sums = [note.removeprefix(_CHECKSUM) for note in notes if _is(note, _CHECKSUM)]
-        if not (said or sums):
+        if not (statements or sums):
             return None
         changed = sums != [checksum(notes)]
         try:
-            flange = str(json.loads(said.get(_FLANGE, '""')))
-            approach = float(json.loads(said.get(_APPROACH, "1.0")))
-            carried = json.loads(said.get(_LOAD, "null"))
+            flange = str(json.loads(statements.get(_FLANGE, '""')))
+            approach = float(json.loads(statements.get(_APPROACH, "1.0")))
+            carried = json.loads(statements.get(_LOAD, "null"))
             load = None
             if carried is not None:
                 load = Load(float(carried[0]), np.array([float(x) for x in carried[1:4]]))
-            held = {name: float(x) for name, x in json.loads(said.get(_HELD, "{}")).items()}
+            held = {name: float(x) for name, x in json.loads(statements.get(_HELD, "{}")).items()}
             outputs = {
                 event: None if value is None else (str(value[0]), bool(value[1]))
-                for event, value in json.loads(said.get(_OUTPUTS, "{}")).items()
+                for event, value in json.loads(statements.get(_OUTPUTS, "{}")).items()
             }
         except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
             return cls(is_changed=True)
-        return cls(flange, held, outputs, said.get(_UNIT, ""), load, approach, changed)
+        return cls(flange, held, outputs, statements.get(_UNIT, ""), load, approach, changed)
 
     @property
     def notes(self) -> list[str]:
@@ -214,11 +216,11 @@ def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange:
     if not held:
         return []
     settings = ProgramSettings(flange=flange or None)
-    tool, own = tool_from_flange(robot, settings), _beyond(robot, flange)
-    found = []
+    tool, link_loads = tool_from_flange(robot, settings), _beyond(robot, flange)
+    loads = []
     for mass, center in held:
-        found.append(_together([*own, Load(mass, np.asarray(tool.act(center)))]))
-    return found
+        loads.append(_together([*link_loads, Load(mass, np.asarray(tool.act(center)))]))
+    return loads
 
 
 def check_load(
@@ -253,7 +255,7 @@ def _beyond(robot: RobotModel, flange: str) -> list[Load]:
         parent, child = joint.find("parent"), joint.find("child")
         if parent is not None and child is not None:
             children.setdefault(parent.get("link", ""), []).append(child.get("link", ""))
-    links, found = [flange], list[Load]()
+    links, loads = [flange], list[Load]()
     while links:
         name = links.pop()
         links += [each for each in children.get(name, ()) if robot.carrier_of(each)[0] == carrier]
@@ -265,8 +267,8 @@ def _beyond(robot: RobotModel, flange: str) -> list[Load]:
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         center = np.array([float(value) for value in text.split()])
         at: SE3 = place.inverse() * robot.carrier_of(name)[1]
-        found.append(Load(float(mass.get("value", "0")), np.asarray(at.act(center))))
-    return found
+        loads.append(Load(float(mass.get("value", "0")), np.asarray(at.act(center))))
+    return loads
 
 
 def _together(loads: Sequence[Load]) -> Load:

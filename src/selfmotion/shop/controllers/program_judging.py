@@ -79,7 +79,7 @@ def judge_program(
     failures = (
         *_job_faults(job),
         *gaps(job.robot, sequence, rounding),
-        *_end_faults(job, sequence, rounding, _ends_by_joints(program)),
+        *_end_faults(job, sequence, rounding, _unshifted_ends(program)),
         *([program.start_fault] if program.start_fault else []),
         *switching_faults(program, job),
         *_move_faults(file, program, job, motions),
@@ -149,10 +149,10 @@ def _end_rounding(program: ControllerProgram) -> float:
     return _POSE_ROUNDING if has_poses else JOINT_ROUNDING
 
 
-def _ends_by_joints(program: ControllerProgram) -> tuple[bool, bool]:
-    """Return whether the begin and the end of a program are where its job has them.
+def _unshifted_ends(program: ControllerProgram) -> tuple[bool, bool]:
+    """Return whether the begin and the end of a program stay where its job has them.
 
-    Poses move with a shifted work object; joint targets do not.
+    A shifted work object takes poses with it; joint targets stay.
     """
     if program.shift is None:
         return True, True

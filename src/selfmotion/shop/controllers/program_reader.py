@@ -115,10 +115,10 @@ class ProgramReader:
         actions = self.actions()
         for line in self.lines:
             text = " ".join(line.split())
-            found = self.language.find(text, self.state)
-            if found is None:
+            match = self.language.find(text, self.state)
+            if match is None:
                 raise self.lines.fault(self._unread(text))
-            statement, texts = found
+            statement, texts = match
             self.check(statement.kind)
             values: dict[str, Any] = {
                 name: self.language.fields[field].read(self, texts[name])
@@ -146,10 +146,12 @@ class ProgramReader:
         FileFormatError
             Something is missing, or the arm cannot follow.
         """
-        said, present, file = self.comments.axes(), self.axes, self.lines.file
+        stated_axes, present, file = self.comments.axes(), self.axes, self.lines.file
         # Robots of fewer axes have numbers in the places of those they lack.
-        columns = [k for k, axis in enumerate(present) if axis in said or not said]
-        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in columns)
+        columns = [k for k, axis in enumerate(present) if axis in stated_axes or not stated_axes]
+        axes = tuple(
+            Axis(present[k], *stated_axes.get(present[k], (present[k], False))) for k in columns
+        )
         if not axes:
             raise FileFormatError(f"{file}: has no axes of those that its comments name")
         self._check_unnamed(columns)
@@ -310,8 +312,8 @@ class ProgramReader:
         begins_by_pose, by_poses = isinstance(self.here, Pose), isinstance(run[0].at, Pose)
         if self.here is None or begins_by_pose != by_poses:
             kinds = ("a pose", "axis targets")
-            given, before = kinds if by_poses else kinds[::-1]
-            raise self.lines.fault(f"{given} after {before}, expected a slow motion there first")
+            kind, before = kinds if by_poses else kinds[::-1]
+            raise self.lines.fault(f"{kind} after {before}, expected a slow motion there first")
         return [self.here, *(target.at for target in run)]
 
     def _paced(self, run: list[Target], *, is_spline: bool) -> list[float]:
@@ -328,20 +330,22 @@ class ProgramReader:
             )
         speeds = [target.speed for target in run]
         vias = np.array([[np.nan] * 3 if x.via is None else x.via.position for x in run])
-        own = times_at(np.array([x.position for x in every if isinstance(x, Pose)]), vias, speeds)
-        if not (np.diff(own) > 0.0).all():
-            k = int(np.argmin(np.diff(own)))
+        feed_times = times_at(
+            np.array([x.position for x in every if isinstance(x, Pose)]), vias, speeds
+        )
+        if not (np.diff(feed_times) > 0.0).all():
+            k = int(np.argmin(np.diff(feed_times)))
             raise self.lines.fault(
                 f"target {k + 1} of a seam at its speed is where the one before is, expected a way "
                 f"to go: at a speed a step of no length takes no time"
             )
-        if not 0.0 < own[-1] < planned:
+        if not 0.0 < feed_times[-1] < planned:
             raise self.lines.fault(
-                f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
+                f"at these speeds it takes {feed_times[-1]:.6g} s without ramps, planned are "
                 f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
             )
         # Half of the length to come to the slowest of its speeds, half to stop.
-        least = min(speeds) ** 2 / float(np.diff(own) @ np.array(speeds))
+        least = min(speeds) ** 2 / float(np.diff(feed_times) @ np.array(speeds))
         acceleration = min(target.acceleration for target in run)
         if not acceleration >= (1.0 - _ROUNDED) * least:
             raise self.lines.fault(
@@ -349,7 +353,7 @@ class ProgramReader:
                 f"less the tool never is at its speed"
             )
         self.rows.append(Row(self.comments.last_step(), every, [planned], speeds, vias, is_spline))
-        times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
+        times: list[float] = Ramps(float(feed_times[-1]), planned).times(feed_times).tolist()
         return times
 
     def check_stopped(self, what: str) -> None:

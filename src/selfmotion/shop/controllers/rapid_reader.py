@@ -53,8 +53,8 @@ class RapidReader(ProgramReader):
     def work(self) -> SE3 | None:
         if "object" not in self.settings:
             return None
-        user, own = self.settings["user"], self.settings["object"]
-        return user * own if self.settings["fixed"] else own
+        user, object_frame = self.settings["user"], self.settings["object"]
+        return user * object_frame if self.settings["fixed"] else object_frame
 
     @property
     @override
@@ -81,10 +81,11 @@ class RapidReader(ProgramReader):
         """Take a slow motion; nothing has judged one that is faster than those."""
         known, most = self._speeds.get(speed.lower()), (FASTEST, APPROACH_TURNING) * 2
         if known is None or any(x > least for x, least in zip(known, most, strict=True)):
-            found = "none of the module" if known is None else _in_words(known)
+            speed_text = "none of the module" if known is None else _in_words(known)
             raise self.lines.fault(
-                f"a motion to where the program goes on has speed '{speed}' ({found}), expected a "
-                f"speeddata of the module of at most {_in_words(most)}: nothing has judged it"
+                f"a motion to where the program goes on has speed '{speed}' ({speed_text}), "
+                f"expected a speeddata of the module of at most {_in_words(most)}: nothing has "
+                f"judged it"
             )
         self.approach(target)
 
@@ -144,7 +145,7 @@ class RapidReader(ProgramReader):
                 f"rounded by {1e3 * ZONE:g} mm at most"
             )
         turning = self._speeds[speed.lower()][1:]
-        if any(own < least for own, least in zip(turning, TURNING, strict=True)):
+        if any(value < least for value, least in zip(turning, TURNING, strict=True)):
             raise self.lines.fault(
                 f"speeddata '{speed}' has {_in_words(turning)} for turning and external axes, "
                 f"expected at least {_in_words(TURNING)}: slower ones hold the tool back from its "

@@ -147,8 +147,8 @@ def _rate_that_keeps(plan: Plan) -> float | None:
         deviations, intervals = _deviations(plan, rate)
         share = (deviations / [tolerance.position, tolerance.rotation]).max(axis=1)
         # The miss of a line over a span h is that of a parabola: it grows with h².
-        found = float(np.ceil((np.sqrt(share) / intervals).max()))
-        return max(found, lowest), bool(share.max() <= 1.0)
+        needed_rate = float(np.ceil((np.sqrt(share) / intervals).max()))
+        return max(needed_rate, lowest), bool(share.max() <= 1.0)
 
     # The samples of the plan itself lie too far apart for more than a first guess.
     rate, _ = needed(None)
@@ -177,8 +177,8 @@ def coarsest_rate(plan: Plan) -> float | None:
         return None
     samples = MotionSamples.of(motion, rate)
     coarse = Trajectory(samples.t, samples.q, samples.qd, motion.joint_names, samples.qdd)
-    found = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
-    return rate if found.verified else None
+    certificate = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
+    return rate if certificate.verified else None
 
 
 def within_limits_at(plan: Plan, rate: float | None) -> Plan:
@@ -263,6 +263,6 @@ def moving_ends(plan: Plan | Parts | Move | Program) -> str:
 
 def check_ends(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
     """Raise PlanError for a motion that begins or ends moving unasked, unless it is forced."""
-    said = "" if force else moving_ends(plan)
-    if said:
-        raise PlanError(f"{file}: is not written: {said}, or give force=True to write it as it is")
+    fault = "" if force else moving_ends(plan)
+    if fault:
+        raise PlanError(f"{file}: is not written: {fault}, or give force=True to write it as it is")

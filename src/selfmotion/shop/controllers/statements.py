@@ -97,9 +97,9 @@ class Table:
         exact.
         """
         for statement, pattern in self._patterns:
-            found = pattern.fullmatch(text) if state in statement.states else None
-            if found:
-                return statement, found.groupdict()
+            match = pattern.fullmatch(text) if state in statement.states else None
+            if match:
+                return statement, match.groupdict()
         return None
 
     @cached_property

@@ -215,16 +215,16 @@ class PoseSection(Section):
         turned = (quaternions[1] - quaternions[0]) / _AROUND**2
         joints = self.frames.joint_rates(q[1], np.hstack([positions, turned]))
         others = ((q[0] - 2.0 * q[1] + q[2]) / _AROUND**2)[:, self.frames.external]
-        found: Array = np.linalg.norm(positions, axis=1) / allowed.position
+        shares: Array = np.linalg.norm(positions, axis=1) / allowed.position
         for rates in (
             np.linalg.norm(turned, axis=1, keepdims=True),
             np.abs(joints),
             np.abs(others),
         ):
             if rates.shape[1]:
-                found = np.maximum(found, rates.max(axis=1) / allowed.rotation)
+                shares = np.maximum(shares, rates.max(axis=1) / allowed.rotation)
         # Singular configurations are found where they are; they do not decide how dense all is.
-        return np.asarray(np.minimum(found, 8.0 / _SHORTEST**2))
+        return np.asarray(np.minimum(shares, 8.0 / _SHORTEST**2))
 
 
 # Joints as far off as this, of what is allowed, leave nothing to be said of the tool.
@@ -234,8 +234,8 @@ _JOINTS_FAR = 10.0
 def largest(values: Array, count: int) -> Array:
     """Return the largest of the values of each step, (count,), that at its end included."""
     steps = values[:-1].reshape(count, -1)
-    found: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))
-    return np.where(np.isnan(found), np.inf, found)
+    maxima: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))
+    return np.where(np.isnan(maxima), np.inf, maxima)
 
 
 # A motion cut into segments from rest to rest, as controllers pass it.
@@ -276,7 +276,7 @@ def segments_of(
     ProblemError
         It does not begin and end at rest, or takes more targets than any controller has.
     """
-    found: list[Segment] = []
+    segments: list[Segment] = []
     worst = Deviations(NO_DEVIATION, NO_DEVIATION)
     for k, operation in enumerate(operations):
         progress("targets", k + 1, len(operations))
@@ -298,8 +298,8 @@ def segments_of(
                     else Deviations(deviation, NO_DEVIATION)
                 )
                 worst = worst.worse(both)
-                found.append(segment)
-    return found, worst
+                segments.append(segment)
+    return segments, worst
 
 
 def _thinned(
@@ -358,8 +358,8 @@ def _rest_times(motion: Trajectory, events: Sequence[float]) -> list[float]:
     speeds = np.abs(motion.qd).max(axis=1)
     slow = min(_SLOW, _SHARE * float(speeds.max()))
     inside = np.clip(events, motion.t[0], motion.t[-1]).tolist()
-    found = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
+    rest_times = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
     edges = np.diff(np.concatenate([[False], speeds < slow, [False]]).astype(int))
     for begin, end in np.flatnonzero(edges).reshape(-1, 2):
-        found.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
-    return found
+        rest_times.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
+    return rest_times

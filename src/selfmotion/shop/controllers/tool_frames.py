@@ -176,8 +176,8 @@ class ToolFrames:
         """Return the rotation vectors from quaternions to others (K, 4) in the work object."""
         from scipy.spatial.transform import Rotation
 
-        found: Array = (Rotation.from_quat(last) * Rotation.from_quat(first).inv()).as_rotvec()
-        return found
+        turns = Rotation.from_quat(last) * Rotation.from_quat(first).inv()
+        return np.asarray(turns.as_rotvec())
 
     def _rates(self, jacobian: Array, rates: Array) -> Array:
         """Return rates of the tool in the carrier's axes (K, 6) as rates of the arm's joints."""

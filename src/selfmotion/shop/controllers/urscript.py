@@ -170,8 +170,8 @@ def check_joints(robot: RobotModel, joints: Sequence[str], what: str = "") -> No
 def joint_approach(q: Array, settings: ProgramSettings) -> str:
     """Return the line that goes slowly to a configuration (6,)."""
     speed, ramp = settings.approach * _FASTEST_JOINT, settings.approach * _JOINT_ACCELERATION
-    given = {"acceleration": ramp, "speed": _four_digits(speed)}
-    return f"  {URSCRIPT.text('joint approach', axes=q, **given)}"
+    limits = {"acceleration": ramp, "speed": _four_digits(speed)}
+    return f"  {URSCRIPT.text('joint approach', axes=q, **limits)}"
 
 
 def payload(settings: ProgramSettings) -> list[str]:
@@ -291,12 +291,12 @@ class UrscriptReader(ProgramReader):
         }
 
     def _approach(
-        self, target: list[float] | Pose, most: tuple[float, float], unit: str, *given: float
+        self, target: list[float] | Pose, most: tuple[float, float], unit: str, *values: float
     ) -> None:
         """Take a slow motion; nothing has judged one that is faster than those."""
-        if not all(0.0 < value <= _UP * limit for value, limit in zip(given, most, strict=True)):
+        if not all(0.0 < value <= _UP * limit for value, limit in zip(values, most, strict=True)):
             raise self.lines.fault(
-                f"a motion to where the program goes on has a={given[0]:g}, v={given[1]:g}, "
+                f"a motion to where the program goes on has a={values[0]:g}, v={values[1]:g}, "
                 f"expected at most {most[0]:g} {unit}² and {most[1]:g} {unit}: nothing has "
                 f"judged it"
             )
