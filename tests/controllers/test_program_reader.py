@@ -27,7 +27,7 @@ def standing(folder: Path, planned: float) -> ProgramReader:
     file = folder / "seam.mod"
     file.write_text("MODULE seam\n")
     reader = RapidReader(file)
-    reader.here = pose(PLACES[0])
+    reader.last_stop = pose(PLACES[0])
     reader.lines.notes = [COMMENTS.text("planned", seconds=planned)]
     return reader
 

@@ -168,10 +168,12 @@ class ControllerProgram:
         """
         operations = operations_of(plan)
         names = [axis.joint for axis in self.axes]
-        known = plan.robot.joint_names
-        if sorted(names) != sorted(known):
-            raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
-        order = [names.index(name) for name in known]
+        joint_names = plan.robot.joint_names
+        if sorted(names) != sorted(joint_names):
+            raise FileFormatError(
+                f"has joints {', '.join(names)}, expected {', '.join(joint_names)}"
+            )
+        order = [names.index(name) for name in joint_names]
         worst = Deviations(NO_DEVIATION, NO_DEVIATION)
         # Time within the present operation, and its index.
         elapsed, k = 0.0, 0

@@ -164,7 +164,7 @@ class KrlReader(ProgramReader):
 
     def _take_trigger(self, output: str = "", value: bool | None = None, event: str = "") -> None:
         """Take an output or event at the target that follows."""
-        self.happen(Switch(0.0, output or event.strip(), value), ahead=1)
+        self.add_switch(Switch(0.0, output or event.strip(), value), ahead=1)
 
     def _end_times(self, seconds: float) -> None:
         """Take the time of all targets, and end their motion."""
@@ -184,7 +184,7 @@ class KrlReader(ProgramReader):
         self.stop()
 
     def _check_triggers(self) -> None:
-        if any(number > len(self.run) for number, _ in self.happens):
+        if any(number > len(self.run) for number, _ in self.run_switches):
             raise self.lines.fault("a trigger has no target after it")
 
     def _check_axis_speeds(self) -> None:
@@ -199,7 +199,7 @@ class KrlReader(ProgramReader):
 
     def _check_in_time(self) -> None:
         """Refuse speeds in force that hold the tool back from the times of a block."""
-        poses = [at for at in (self.here, *(x.at for x in self.run)) if isinstance(at, Pose)]
+        poses = [place for place in self._run_places() if isinstance(place, Pose)]
         if len(poses) == len(self.run):
             # It begins at axis targets, which `stop` refuses.
             return

@@ -336,9 +336,9 @@ def _write_stream(
 ) -> None:
     """Write URScript with all that is to be said besides the motion."""
     motion = MotionSamples.of(plan.motion if isinstance(plan, Move) else plan.trajectory, rate)
-    happens = plan.events if isinstance(plan, Program) else ()
-    check_signals({event: seam for _, seam, event in happens}, settings)
-    events = [(int(np.searchsorted(motion.t, at - 1e-9)), event) for at, _, event in happens]
+    job_events = plan.events if isinstance(plan, Program) else ()
+    check_signals({event: seam for _, seam, event in job_events}, settings)
+    events = [(int(np.searchsorted(motion.t, time - 1e-9)), event) for time, _, event in job_events]
     joints, q = motion.robot_joints, motion.q
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 

@@ -159,25 +159,35 @@ class ProgramFacts:
         return [*parts, f"{_APPROACH}{json.dumps(self.approach)}"]
 
     def against(self, robot: RobotModel, load: Load | None) -> Iterator[str]:
-        """Yield what of it is not as an arm has it, or as the program says its load."""
+        """Yield the facts that differ from an arm's held joints or from the program's own load."""
         if self.is_changed:
             yield (
                 "what its head states (axes, deviations, held joints, outputs, frames) was changed "
                 "by hand, as its checksum tells: write the program again"
             )
             return
-        known = (load is None) == (self.load is None)
-        if not known or (load and self.load and not load.is_like(self.load)):
+        yield from self._load_fault(load)
+        yield from self._held_joint_faults(robot)
+
+    def _load_fault(self, load: Load | None) -> Iterator[str]:
+        """Yield that the load of the program is another one than it was written with."""
+        is_only_one_stated = (load is None) != (self.load is None)
+        if is_only_one_stated or (load and self.load and not load.is_like(self.load)):
             now, before = ("no load" if x is None else str(x) for x in (load, self.load))
             yield f"it says that the flange carries {now}, it was written with {before}"
+
+    def _held_joint_faults(self, robot: RobotModel) -> Iterator[str]:
+        """Yield the joints that are held in the program alone, in the arm alone, or elsewhere."""
         for name in sorted({*self.held, *robot.locked}):
-            here, there = self.held.get(name), robot.locked.get(name)
-            if here is None:
+            written, current = self.held.get(name), robot.locked.get(name)
+            if written is None:
                 yield f"it was written for an arm whose joint '{name}' is not held"
-            elif there is None:
-                yield f"it was written with joint '{name}' held at {here:.6g}, here it is not held"
-            elif abs(here - there) > _DIGITS:
-                yield f"it was written with joint '{name}' held at {here:.6g}, here at {there:.6g}"
+                continue
+            statement = f"it was written with joint '{name}' held at {written:.6g}"
+            if current is None:
+                yield f"{statement}, here it is not held"
+            elif abs(written - current) > _DIGITS:
+                yield f"{statement}, here at {current:.6g}"
 
 
 def with_checksum(notes: Sequence[str]) -> list[str]:
@@ -266,8 +276,8 @@ def _beyond(robot: RobotModel, flange: str) -> list[Load]:
         origin = element.find("origin")
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         center = np.array([float(value) for value in text.split()])
-        at: SE3 = place.inverse() * robot.carrier_of(name)[1]
-        loads.append(Load(float(mass.get("value", "0")), np.asarray(at.act(center))))
+        link_pose: SE3 = place.inverse() * robot.carrier_of(name)[1]
+        loads.append(Load(float(mass.get("value", "0")), np.asarray(link_pose.act(center))))
     return loads
 
 

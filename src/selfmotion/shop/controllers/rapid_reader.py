@@ -79,12 +79,12 @@ class RapidReader(ProgramReader):
 
     def _approach(self, target: list[float] | Pose, speed: str) -> None:
         """Take a slow motion; nothing has judged one that is faster than those."""
-        known, most = self._speeds.get(speed.lower()), (FASTEST, APPROACH_TURNING) * 2
-        if known is None or any(x > least for x, least in zip(known, most, strict=True)):
-            speed_text = "none of the module" if known is None else _in_words(known)
+        speeds, limits = self._speeds.get(speed.lower()), (FASTEST, APPROACH_TURNING) * 2
+        if speeds is None or any(x > most for x, most in zip(speeds, limits, strict=True)):
+            speed_text = "none of the module" if speeds is None else _in_words(speeds)
             raise self.lines.fault(
                 f"a motion to where the program goes on has speed '{speed}' ({speed_text}), "
-                f"expected a speeddata of the module of at most {_in_words(most)}: nothing has "
+                f"expected a speeddata of the module of at most {_in_words(limits)}: nothing has "
                 f"judged it"
             )
         self.approach(target)
@@ -128,11 +128,11 @@ class RapidReader(ProgramReader):
 
     def _check_name(self, kind: str, name: str) -> None:
         """Refuse another tool or work object than that of the module."""
-        known = str(self.settings.get(kind, ""))
-        if name.lower() != known.lower():
+        expected = str(self.settings.get(kind, ""))
+        if name.lower() != expected.lower():
             what = "tool" if kind == "tool" else "work object"
             raise self.lines.fault(
-                f"{what} is '{name}', expected '{known}', the one that the module has"
+                f"{what} is '{name}', expected '{expected}', the one that the module has"
             )
 
     def _check_judged(self, speed: str, zone: str, *, is_round: bool) -> None:

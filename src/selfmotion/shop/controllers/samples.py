@@ -63,8 +63,8 @@ class MotionSamples:
         if rate is None:
             t = np.round(motion.t - motion.t[0], _DIGITS)
         else:
-            known = isinstance(rate, Real) and np.isfinite(float(rate))
-            if not (known and 1.0 <= rate * motion.duration <= MAX_SAMPLES):
+            is_finite = isinstance(rate, Real) and np.isfinite(float(rate))
+            if not (is_finite and 1.0 <= rate * motion.duration <= MAX_SAMPLES):
                 raise ProblemError(
                     f"rate is {shown(rate)} Hz, expected a number above "
                     f"{1.0 / motion.duration:.4g} and up to {MAX_SAMPLES / motion.duration:.4g}, "
@@ -190,8 +190,8 @@ def within_limits_at(plan: Plan, rate: float | None) -> Plan:
     if rate is None or not (is_retimed(plan) and plan.certificate.verified):
         return plan
     samples = MotionSamples.of(plan.trajectory, rate)
-    read = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
-    if plan.problem.certify(read, plan.tolerance, plan.report.ending).verified:
+    sampled = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
+    if plan.problem.certify(sampled, plan.tolerance, plan.report.ending).verified:
         return plan
     slower = at_rate(plan, rate)
     return slower if slower.certificate.verified else plan

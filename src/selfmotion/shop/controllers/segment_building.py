@@ -187,8 +187,8 @@ class SegmentBuilder:
         None where the file has no poses.
     segments : list of Segment
         Segments so far.
-    at : (n,) or None
-        Current configuration.
+    last_q : (n,) or None
+        Configuration in which the rows so far end; None before the first.
     start_gap : float
         Joint distance from the first axis target to the first pose [rad or m].
     """
@@ -197,7 +197,7 @@ class SegmentBuilder:
     axes: tuple[Axis, ...]
     frames: ToolFrames | None
     segments: list[Segment] = field(default_factory=list)
-    at: Array | None = None
+    last_q: Array | None = None
     start_gap: float = 0.0
 
     def add(self, row: Row) -> None:
@@ -215,13 +215,13 @@ class SegmentBuilder:
             segment: Segment = self._segment(row)
         else:
             t = times_of(row.seconds)
-            if not row.axes and self.at is None:
+            if not row.axes and self.last_q is None:
                 raise FileFormatError(f"{self.file}: rests before it has a target")
             values = np.array(row.axes, dtype=np.float64)
-            q = self.in_si(values) if row.axes else np.array([self.at] * len(t))
+            q = self.in_si(values) if row.axes else np.array([self.last_q] * len(t))
             segment = Segment(row.name, t, q)
         self.segments.append(segment)
-        self.at = segment.q[-1]
+        self.last_q = segment.q[-1]
 
     def in_si(self, values: Array, columns: Sequence[int] | None = None) -> Array:
         """Return coordinates in rad or m."""
@@ -229,12 +229,12 @@ class SegmentBuilder:
         return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
 
     def _add_slow_motion(self, row: Row) -> None:
-        before, (target,) = self.at, row.targets
+        before, (target,) = self.last_q, row.targets
         if not isinstance(target, Pose):
-            self.at = self.in_si(np.array(target, dtype=np.float64))
-            if before is not None and np.abs(self.at - before).max() > _SAME_PLACE:
-                seconds = float(np.abs(self.at - before).max()) / _SLOW_SPEED
-                both = np.array([before, self.at])
+            self.last_q = self.in_si(np.array(target, dtype=np.float64))
+            if before is not None and np.abs(self.last_q - before).max() > _SAME_PLACE:
+                seconds = float(np.abs(self.last_q - before).max()) / _SLOW_SPEED
+                both = np.array([before, self.last_q])
                 self.segments.append(Segment(_SLOW_NAME, times_of([seconds]), both, is_slow=True))
             return
         frames, _ = self._frames_and_order()
@@ -246,14 +246,14 @@ class SegmentBuilder:
         # Slowly from where the arm is, however far that is.
         seconds = max(far / _SLOW_SPEED, angle / _SLOW_SPEED, _SHORTEST)
         moves = bool(self.segments) and max(far, angle) > _SAME_PLACE
-        here = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
-        slow = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
+        begin = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
+        slow = self._segment(Row(_SLOW_NAME, [begin, target], [seconds]))
         segment = replace(slow, is_slow=True)
         if not self.segments:
             self.start_gap = float(np.abs(segment.q[-1] - before).max())
         if moves:
             self.segments.append(segment)
-        self.at = segment.q[-1]
+        self.last_q = segment.q[-1]
 
     def _segment(self, row: Row) -> PoseSegment:
         """Return the segment of poses, with joints by inverse kinematics from the current ones."""
@@ -276,23 +276,23 @@ class SegmentBuilder:
         rows = linear_poses(times, t, np.hstack([positions, quaternions, external]))
         if at_speeds:
             put_on_arcs(rows, times, t, positions, row.vias)
-        if self.at is None:
+        if self.last_q is None:
             raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
-        q = self._inverse_kinematics(frames, rows, self._by_robot(self.at[None])[0], row, count)
-        every = q[np.arange(0, len(times), count)]
+        q = self._inverse_kinematics(frames, rows, self._by_robot(self.last_q[None])[0], row, count)
+        target_q = q[np.arange(0, len(times), count)]
 
-        def near(wanted: Array) -> Array:
-            return np.stack([np.interp(wanted, times, column) for column in q.T], axis=1)
+        def near(seed_times: Array) -> Array:
+            return np.stack([np.interp(seed_times, times, column) for column in q.T], axis=1)
 
         segment = PoseSegment(
             row.name,
             t,
-            every,
+            target_q,
             positions=positions,
             quaternions=quaternions,
             frames=frames,
             near=near,
-            order=np.arange(every.shape[1]),
+            order=np.arange(target_q.shape[1]),
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)

@@ -194,11 +194,11 @@ class PoseSection(Section):
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
             for chain in self.operation.chains:
-                _, turned, here = chain.along(line)
-                _, facing, there = chain.along(exact)
-                off = np.linalg.norm(here - there, axis=1) / allowed.position
+                _, rotations, positions = chain.along(line)
+                _, exact_rotations, exact_positions = chain.along(exact)
+                off = np.linalg.norm(positions - exact_positions, axis=1) / allowed.position
                 # |R - R'| is 2√2 sin(angle / 2).
-                angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
+                angle = np.linalg.norm(rotations - exact_rotations, axis=(1, 2)) / np.sqrt(2.0)
                 off = np.maximum(off, angle / allowed.rotation)
                 worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SAMPLING_FACTOR * worst, np.inf)
