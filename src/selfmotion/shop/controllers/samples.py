@@ -116,7 +116,15 @@ def linear_deviation(plan: Plan, rate: float | None = None) -> LinearDeviation:
 
 
 def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
-    """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
+    """Return how far straight lines between samples leave a motion.
+
+    Returns
+    -------
+    deviations : (K, 2)
+        Of the tool on each interval: position [m], rotation [rad].
+    intervals : (K,)
+        Durations between samples [s].
+    """
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
     intervals = np.diff(samples.t)
@@ -125,12 +133,13 @@ def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * intervals, motion.t[-1])
         straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
         for chain in chains:
-            (_, turned, here), (_, facing, there) = chain.along(straight), chain.along(exact)
-            far = np.linalg.norm(here - there, axis=1)
+            _, rotations, positions = chain.along(straight)
+            _, exact_rotations, exact_positions = chain.along(exact)
+            distance = np.linalg.norm(positions - exact_positions, axis=1)
             # |R - R'| is 2√2 sin(angle / 2).
-            half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
+            half = np.linalg.norm(rotations - exact_rotations, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
-            deviations = np.maximum(deviations, np.stack([far, angle], axis=1))
+            deviations = np.maximum(deviations, np.stack([distance, angle], axis=1))
     return deviations, intervals
 
 

@@ -313,40 +313,45 @@ class SegmentBuilder:
         A block of poses is solved at once; where that is not continuous, one pose after another.
         """
         joints = np.empty((len(rows), len(first)))
-        at = np.array(first)
+        current = np.array(first)
         for k in range(0, len(rows), _SAMPLES):
             block = rows[k : k + _SAMPLES]
-            q, arrived = self._solved(frames, block, at)
-            steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
+            q, arrived = self._solutions(frames, block, current)
+            steps = np.diff(np.vstack([current, q]), axis=0)[:, frames.arm]
             # The arm may be elsewhere before its first pose: of a shifted work object.
             if (
                 not arrived.all()
                 or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _LARGE_STEP
             ):
-                q = self._sequential(frames, block, at, row, (k, count))
+                q = self._sequential_solutions(frames, block, current, row, (k, count))
             joints[k : k + _SAMPLES] = q
-            at = q[-1]
+            current = q[-1]
         return joints
 
-    def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
-        seeds = np.repeat(at[None], len(poses), axis=0)
+    def _solutions(self, frames: ToolFrames, poses: Array, current: Array) -> tuple[Array, Flags]:
+        """Return the joints of poses, all from the current ones, and whether each converged."""
+        seeds = np.repeat(current[None], len(poses), axis=0)
         seeds[:, frames.external] = poses[:, 7:]
         return frames.inverse_kinematics(poses[:, :3], poses[:, 3:7], seeds)
 
-    def _sequential(
-        self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]
+    def _sequential_solutions(
+        self, frames: ToolFrames, poses: Array, current: Array, row: Row, position: tuple[int, int]
     ) -> Array:
-        joints, (first, count) = np.empty((len(poses), len(at))), position
+        """Return the joints of poses, each from those of the pose before.
+
+        `position` is the index of the first pose in its row, and the poses per interval.
+        """
+        joints, (first, count) = np.empty((len(poses), len(current))), position
         for k, pose in enumerate(poses, first):
-            q, arrived = self._solved(frames, pose[None], at)
-            far = np.abs(q[0] - at)[frames.arm].max()
-            if not arrived[0] or (far > _JUMP and k):
+            q, arrived = self._solutions(frames, pose[None], current)
+            jump = np.abs(q[0] - current)[frames.arm].max()
+            if not arrived[0] or (jump > _JUMP and k):
                 line = row.poses[min(k // count + 1, len(row.poses) - 1)].line
                 raise FileFormatError(
                     f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
                     f"reach, or singular on the way"
                 )
-            joints[k - first] = at = q[0]
+            joints[k - first] = current = q[0]
         return joints
 
     def _frames_and_order(self) -> tuple[ToolFrames, list[int]]:
@@ -357,6 +362,7 @@ class SegmentBuilder:
         return self.frames, [names.index(axis.joint) for axis in self.axes]
 
     def _by_robot(self, q: Array) -> Array:
+        """Return configurations (K, n) in the robot's order of joints."""
         _, order = self._frames_and_order()
         return q[:, np.argsort(order)]
 

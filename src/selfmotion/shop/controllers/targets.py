@@ -91,8 +91,10 @@ class PoseSection(Section):
         t = subdivided(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
         far = _OF_POSES / np.maximum(self.frames.smallest_singular_values(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
-            at = float(t[int(far.argmax())] - motion.t[0])
-            raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
+            elapsed = float(t[int(far.argmax())] - motion.t[0])
+            raise NotByPosesError(
+                f"'{self.operation.name}': the arm is singular at t = {elapsed:.4g} s"
+            )
 
     @override
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
@@ -135,10 +137,11 @@ class PoseSection(Section):
             t = np.sort(np.append(t, (0.5 * (t[1:] + t[:-1]))[near]))
         raise self._singular(float(t[:-1][far][0]), allowed)
 
-    def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
-        time = at - self.operation.motion.t[0]
+    def _singular(self, time: float, allowed: Tolerance) -> NotByPosesError:
+        """Return the error that poses near a time of the motion [s] do not give its joints."""
+        elapsed = time - self.operation.motion.t[0]
         return NotByPosesError(
-            f"'{self.operation.name}': near t = {time:.4g} s the joints do not "
+            f"'{self.operation.name}': near t = {elapsed:.4g} s the joints do not "
             f"follow from poses within {1e3 * allowed.position:.3g} mm and "
             f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
         )
@@ -358,7 +361,7 @@ def _rest_times(motion: Trajectory, events: Sequence[float]) -> list[float]:
     speeds = np.abs(motion.qd).max(axis=1)
     slow = min(_SLOW, _SHARE * float(speeds.max()))
     inside = np.clip(events, motion.t[0], motion.t[-1]).tolist()
-    rest_times = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
+    rest_times = [time for time in inside if np.abs(motion(time, 1)).max() < slow]
     edges = np.diff(np.concatenate([[False], speeds < slow, [False]]).astype(int))
     for begin, end in np.flatnonzero(edges).reshape(-1, 2):
         rest_times.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))

@@ -43,7 +43,7 @@ def script(
     settings : ProgramSettings, optional
         Flange, load, outputs, and how fast to the start.
     events : sequence of (int, str)
-        Before which sample what happens. Outputs are switched as late as the arm follows.
+        Samples, and the event before each. Outputs are switched as late as the arm follows.
 
     Raises
     ------
