@@ -15,7 +15,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
-from selfmotion.shop.controllers import judged_program, program_deviation, read_program
+from selfmotion.shop.controllers import judge_program, program_deviation, read_program
 from selfmotion.shop.controllers.arcs import arc_through
 from selfmotion.shop.controllers.controller_axes import axes_of
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, Ramps, times_at
@@ -359,7 +359,7 @@ def test_strokes_switch_where_their_feed_begins(
         stretch for stretch in read_program(file, ur10).segments if isinstance(stretch, FeedSegment)
     ]
     assert [len(stretch.speeds) for stretch in strokes] == [3, 3]
-    found = judged_program(file, program)
+    found = judge_program(file, program)
     assert found.verified, found.verdict
     read = read_poses(file, SLIDES)
     moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
@@ -377,7 +377,7 @@ def test_the_shell_judges_strokes_as_python_does(
     code, text = invoke("check", file, "--robot", job, "--json")
     assert code == 0, text
     verdict = json.loads(text)["verdict"]
-    assert verdict == judged_program(file, strokes_program).verdict
+    assert verdict == judge_program(file, strokes_program).verdict
     assert "seams at their feeds are judged with the ramps of the plan" in verdict
 
 
@@ -468,7 +468,7 @@ def test_slow_motions_to_a_shifted_seam_are_judged(tmp_path: Path) -> None:
     assert text.count("MoveAbsJ") > 10
     assert len(re.findall(r"MoveL .*_f1", text)) == 1
     file.write_text(text.replace('TRUE, "", [[0.0000,', 'TRUE, "", [[30.0000,'))
-    found = judged_program(file, program)
+    found = judge_program(file, program)
     assert found.verified, found.verdict
     slow = [step for step in found.steps if step.name.startswith("slowly to")]
     assert [step.name for step in slow] == ["slowly to 'slowly'", "slowly to 'slowly → job end'"]
@@ -480,7 +480,7 @@ def test_slow_motions_to_a_shifted_seam_are_judged(tmp_path: Path) -> None:
         else step
         for step in program.steps
     ]
-    strict = judged_program(file, replace(program, steps=tuple(steps)))
+    strict = judge_program(file, replace(program, steps=tuple(steps)))
     told = {step.name: step.verified for step in strict.steps}
     assert not told["slowly to 'slowly'"]
     assert told["slowly"]
@@ -503,7 +503,7 @@ def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
     assert read.timed == (
         "an event is where the tool is slower than its feed, or it is at no feed",
     )
-    assert judged_program(file, program).verified
+    assert judge_program(file, program).verified
     (tmp_path / "cell.toml").write_text(
         'mass = 3\ntargets = "poses"\n'
         '[signals]\n"gun on" = ["doGun", true]\n"gun off" = ["doGun", false]\n'

@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import (
     base_rotation_note,
-    judged_program,
+    judge_program,
     program_deviation,
     program_files,
     read_program,
@@ -265,7 +265,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
     program.save(job)
     asked = settings(name, deviation=sm.Tolerance(1e-3, 1e-2))
     sm.files.write_motion(program, file, settings=asked)
-    assert judged_program(file, program).verified, judged_program(file, program).verdict
+    assert judge_program(file, program).verified, judge_program(file, program).verdict
     _, stated, _ = program_deviation(program, file)
     moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
     read = read_poses(file, SLIDES)
@@ -284,14 +284,14 @@ def test_a_job_keeps_its_seams_events_and_waits(
         "weld.script": ("feature = p[0.000000000,", "feature = p[0.005000000,"),
     }
     file.write_text(content.replace(*shifts[name]))
-    found = judged_program(file, program)
+    found = judge_program(file, program)
     assert "the work object is 5 mm and 0° from where it was planned" in found.verdict
     assert found.verified, found.verdict
     # An event at another time, and a seam that is lost.
     marks = {"weld.mod": "SetDO doArc, 1", "weld.src": "$OUT[7] = TRUE"}
     mark = marks.get(name, "set_standard_digital_out(7, True)")
     file.write_text(content.replace(mark, mark.replace("7", "6").replace("doArc", "doGas"), 1))
-    assert not judged_program(file, program).verified
+    assert not judge_program(file, program).verified
 
 
 def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> None:
@@ -509,7 +509,7 @@ def test_a_job_from_home_to_home_is_read_as_it_is_written(name: str, tmp_path: P
     job = sm.plan_job(ur5, [seam], **given).require()
     file = tmp_path / name
     sm.files.write_motion(job, file, settings=settings(name))
-    assert judged_program(file, job).verified
+    assert judge_program(file, job).verified
     # The seam keeps its poses, which a shop can shift.
     assert re.search(r"movel\(|MoveL |SLIN ", file.read_text())
 

@@ -27,7 +27,7 @@ def standing(folder: Path, planned: float) -> ProgramReader:
     file = folder / "seam.mod"
     file.write_text("MODULE seam\n")
     reader = RapidReader(file)
-    reader.here = pose(PLACES[0])
+    reader.last_stop = pose(PLACES[0])
     reader.lines.notes = [COMMENTS.text("planned", seconds=planned)]
     return reader
 
@@ -50,7 +50,7 @@ def test_a_motion_at_a_speed_takes_the_time_that_was_planned(
     (row,) = reader.rows
     assert row.seconds == [planned]
     assert reader.clock == planned
-    times = [switch.at for switch in reader.switches]
+    times = [switch.time for switch in reader.switches]
     assert 0.0 < times[0] < times[1] < planned
     # The second place is three quarters along the way.
     assert times[0] < 0.5 * planned < times[1]

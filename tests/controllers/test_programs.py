@@ -13,7 +13,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Separation
 from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
-from selfmotion.shop.controllers import judged_program, program_deviation, read_program
+from selfmotion.shop.controllers import judge_program, program_deviation, read_program
 from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
 from selfmotion.shop.controllers.deviations import NO_DEVIATION
 from selfmotion.shop.controllers.operations import Operation
@@ -322,14 +322,14 @@ def test_a_program_of_a_job_is_verified_by_its_job(
         r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
     )
     file.write_text(text[:middle] + moved)
-    found = judged_program(file, program).steps
+    found = judge_program(file, program).steps
     assert sum(not step.verified for step in found) == 1
     code, text = invoke("check", file, "--robot", job, "--verbose")
     assert code == 1
     assert f"not verified: 1 of {len(found)} steps" in text
     other = replace(program, steps=program.steps[:-1])
     with pytest.raises(sm.errors.FileFormatError, match="goes on with '"):
-        judged_program(file, other)
+        judge_program(file, other)
 
 
 @pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
@@ -602,7 +602,7 @@ def test_a_file_is_judged_as_a_whole_by_its_job(
     """Its ends and its outputs, though each of its steps is verified."""
     file = tmp_path / name
     sm.files.write_motion(program, file, settings=settings(name, 1e-3))
-    assert judged_program(file, program).verified
+    assert judge_program(file, program).verified
     text = file.read_text()
     lines = text.splitlines(keepends=True)
     switching = [k for k, line in enumerate(lines) if "$OUT[" in line or "SetDO" in line]
@@ -622,26 +622,26 @@ def test_a_file_is_judged_as_a_whole_by_its_job(
         (other, "event 'arc on' switches"),
     ):
         file.write_text("".join(spoilt))
-        found = judged_program(file, program)
+        found = judge_program(file, program)
         assert not found.verified
         assert said in "; ".join(found.failures), found.failures
         assert all(step.verified for step in found.steps)
     # Nor does what is switched off stay on.
     file.write_text(text.replace("= FALSE", "= TRUE").replace(", 0;", ", 1;"))
-    assert "'arc on' and 'arc off' both switch" in judged_program(file, program).verdict
+    assert "'arc on' and 'arc off' both switch" in judge_program(file, program).verdict
     file.write_text(text)
-    said = judged_program(file, program).verdict
+    said = judge_program(file, program).verdict
     assert re.search(
         r"and the whole; seams within 0\.9\d* mm and \S+ rad of their paths; acc", said
     )
     loose = replace(program, specification=replace(program.specification, start=None))
-    assert judged_program(file, loose).verified
+    assert judge_program(file, loose).verified
     wrong = replace(program, missing={"seam 9": "nobody knows"})
-    assert "the job itself: seam 'seam 9'" in "; ".join(judged_program(file, wrong).failures)
+    assert "the job itself: seam 'seam 9'" in "; ".join(judge_program(file, wrong).failures)
     elsewhere = turned_smoothly(lines, program, 20.0)
     file.write_text("".join(elsewhere))
     assert "does not begin where it was asked to" in "; ".join(
-        judged_program(file, program).failures
+        judge_program(file, program).failures
     )
 
 

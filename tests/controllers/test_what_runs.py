@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3, exp3
 from selfmotion.shop import controllers
-from selfmotion.shop.controllers import judged_program, read_program
+from selfmotion.shop.controllers import judge_program, read_program
 from selfmotion.shop.controllers.program_facts import (
     Load,
     ProgramFacts,
@@ -286,7 +286,7 @@ def test_what_an_event_switches_is_what_it_was_written_to_switch(
 ) -> None:
     file = tmp_path / "weld.src"
     sm.files.write_motion(job, file, settings=sm.files.ProgramSettings(signals=SIGNALS))
-    assert judged_program(file, job).verified
+    assert judge_program(file, job).verified
     text = file.read_text()
     if old == "exchanged":
         words = {"TRUE": "FALSE", "FALSE": "TRUE"}
@@ -295,7 +295,7 @@ def test_what_an_event_switches_is_what_it_was_written_to_switch(
         changed = re.sub(old, new, text)
     assert changed != text
     file.write_text(changed)
-    found = judged_program(file, job)
+    found = judge_program(file, job)
     assert not found.verified
     assert any("event" in text for text in found.failures)
 
@@ -375,12 +375,12 @@ def test_a_load_is_that_which_torques_were_verified_with(tmp_path: Path) -> None
     assert program.load is not None
     (verified,) = verified_loads(ur5, asked, program.facts.flange)
     assert program.load.is_like(verified)
-    assert not list(controllers.differing_facts(program, ur5, asked))
+    assert not list(controllers.header_faults(program, ur5, asked))
     for other in (replace(same, mass=20.0), replace(same, center=(0.0, 0.0, 0.1))):
         with pytest.raises(sm.errors.ProblemError, match="torques were verified with 2 kg"):
             sm.files.write_motion(move, file, settings=other)
     changed = replace(program, load=Load(3.0, program.load.center))
-    assert any("torques" in text for text in controllers.differing_facts(changed, ur5, asked))
+    assert any("torques" in text for text in controllers.header_faults(changed, ur5, asked))
 
 
 def test_the_load_has_what_the_urdf_has_beyond_the_flange() -> None:
@@ -416,7 +416,7 @@ def test_free_moves_are_those_of_the_job(job: sm.Program, tmp_path: Path) -> Non
         target[0], target[0].replace(target[1], f"{float(target[1]) + 2.0:.5f}"), 1
     )
     file.write_text(text[:before] + moved + text[after:])
-    found = judged_program(file, job)
+    found = judge_program(file, job)
     assert program.deviation.moves.joint < np.radians(2.0)
     assert any("free moves are up to" in text for text in found.failures)
 
@@ -486,8 +486,8 @@ def test_a_shift_excuses_only_what_it_moves(job: sm.Program, tmp_path: Path) -> 
     sm.files.write_motion(job, file, settings=shifted)
     text = file.read_text().replace("$BASE = {X 0.00000", "$BASE = {X 0.00300")
     file.write_text(text)
-    assert judged_program(file, job).shifted
-    assert judged_program(file, job).verified
+    assert judge_program(file, job).shift_remark
+    assert judge_program(file, job).verified
     # Aside and back, slowly, between two steps.
     before, after = text.split("  ; step: seam 1\n")
     x, rest = re.findall(r"(?:SPL|SLIN) \{X (-?[\d.]+)(,[^}]*)\}", before)[-1]
@@ -497,7 +497,7 @@ def test_a_shift_excuses_only_what_it_moves(job: sm.Program, tmp_path: Path) -> 
         "  $VEL.CP = 2\n  $VEL.ORI1 = 400\n  $VEL.ORI2 = 400\n"
     )
     file.write_text(f"{before}  ; step: seam 1\n{aside}{after}")
-    found = judged_program(file, job)
+    found = judge_program(file, job)
     assert not found.verified
     assert any("goes slowly to where neither" in text for text in found.failures)
 

@@ -70,7 +70,7 @@ class Read(NamedTuple):
         return (
             *([program.start_fault] if program.start_fault else []),
             *controllers.switching_faults(program, None),
-            *controllers.differing_facts(program, robot, constraints),
+            *controllers.header_faults(program, robot, constraints),
         )
 
 
@@ -81,7 +81,7 @@ def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.Robot
     program = controllers.read_program(file, robot)
     motion = controllers.motion_of_program(file, program)
     if within is None:
-        within = controllers.stated_deviation(program)
+        within = controllers.stated_tolerance(program)
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
@@ -103,13 +103,13 @@ def with_failures(certificate: sm.Certificate, texts: Sequence[str]) -> sm.Certi
 
 def left_to_controller(program: controllers.ControllerProgram | None) -> dict[str, str]:
     """Return what a verdict on a program leaves to the controller, for JSON; of others nothing."""
-    return {} if program is None else {"not_judged": controllers.controller_note(program)}
+    return {} if program is None else {"not_judged": controllers.unjudged_note(program)}
 
 
 def print_controller_note(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
     if program is not None and program.within is not None:
-        terminal.print(controllers.controller_note(program), markup=False, soft_wrap=True)
+        terminal.print(controllers.unjudged_note(program), markup=False, soft_wrap=True)
 
 
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
@@ -197,7 +197,7 @@ def of_problem(
         )
 
     ways = (partial(certify, each) for each in (problem, lines))
-    certificate, motion = controllers.judged_interpolations(motions, *ways)
+    certificate, motion = controllers.worst_certificate(motions, *ways)
     certificate = with_failures(certificate, against)
     return certificate, near(robot, motion, problem.requirements), robot, program
 
@@ -219,7 +219,7 @@ def check_program(
         raise sm.errors.ProblemError(
             f"{file}: is no program of a controller, which {job} could judge"
         )
-    judged = controllers.judged_program(file, sm.load_program(job), within)
+    judged = controllers.judge_program(file, sm.load_program(job), within)
     steps, verified = judged.steps, judged.verified
     if as_json:
         data = {

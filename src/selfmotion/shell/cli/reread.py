@@ -67,7 +67,7 @@ def read_back(
             # Steps meet between its samples: there is no motion of each that rests at its ends.
             return verified(planned), _samples_text(planned.trajectory, motion, rate)
         case sm.Program():
-            found = controllers.judged_motion(motion, planned)
+            found = controllers.judge_motion(motion, planned)
             return found.verified, f"read back: {found.verdict}"
     return _judged_parts(planned, motion, whole=whole)
 

@@ -74,7 +74,7 @@ def _of_plan(file: Path, allow_code: bool) -> PageSession:
 
 def _of_written(file: Path, program: Program) -> PageSession:
     """Return the page of a controller's program: as it is judged, and moves by its first way."""
-    judged = controllers.judged_program(file, program)
+    judged = controllers.judge_program(file, program)
     parts = controllers.step_motions(file, controllers.read_program(file, program.robot), program)
     wrong = [step for step in judged.steps if not step.verified]
     told = [f"'{step.name}': {step.verdict}" for step in wrong[:_TOLD]]

@@ -1,14 +1,6 @@
 """Joint motions for controllers and simulators, written, read back and judged."""
 
 from selfmotion.shop.controllers.controller_program import ControllerProgram as ControllerProgram
-from selfmotion.shop.controllers.judged_programs import (
-    controller_note as controller_note,
-    differing_facts as differing_facts,
-    judged_interpolations as judged_interpolations,
-    judged_motion as judged_motion,
-    judged_program as judged_program,
-    stated_deviation as stated_deviation,
-)
 from selfmotion.shop.controllers.mimic_joints import (
     mimic_joints as mimic_joints,
     without_mimic_joints as without_mimic_joints,
@@ -39,6 +31,13 @@ from selfmotion.shop.controllers.program_files import (
     program_deviation as program_deviation,
     read_program as read_program,
 )
+from selfmotion.shop.controllers.program_judging import (
+    header_faults as header_faults,
+    judge_motion as judge_motion,
+    judge_program as judge_program,
+    stated_tolerance as stated_tolerance,
+    unjudged_note as unjudged_note,
+)
 from selfmotion.shop.controllers.program_settings import (
     ProgramSettings as ProgramSettings,
     program_settings_of as program_settings_of,
@@ -57,7 +56,8 @@ from selfmotion.shop.controllers.shifted_work_objects import (
     as_shifted as as_shifted,
     shift_note as shift_note,
 )
-from selfmotion.shop.controllers.switched_outputs import switching_faults as switching_faults
+from selfmotion.shop.controllers.step_judging import worst_certificate as worst_certificate
+from selfmotion.shop.controllers.switching_faults import switching_faults as switching_faults
 from selfmotion.shop.controllers.target_constraints import (
     by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,

@@ -85,11 +85,11 @@ def step_lengths(positions: Array, vias: Array) -> Array:
     vias : (K, 3)
         Where a step goes round; no numbers where it goes straight.
     """
-    found = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     for k in np.flatnonzero(np.isfinite(vias[:, 0])):
         arc = arc_through(positions[k], vias[k], positions[k + 1])
-        found[k] = found[k] if arc is None else arc.length
-    return np.asarray(found)
+        lengths[k] = lengths[k] if arc is None else arc.length
+    return np.asarray(lengths)
 
 
 def put_on_arcs(rows: Array, times: Array, t: Array, positions: Array, vias: Array) -> None:

@@ -97,6 +97,6 @@ def _meeting(axes: Array, points: Array) -> Array | None:
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     if np.linalg.cond(across.sum(axis=0)) > 1e6:
         return None
-    found = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
-    far = np.linalg.norm(np.einsum("kij,kj->ki", across, found - points), axis=1).max()
-    return found if far < _MEET else None
+    point = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
+    far = np.linalg.norm(np.einsum("kij,kj->ki", across, point - points), axis=1).max()
+    return point if far < _MEET else None

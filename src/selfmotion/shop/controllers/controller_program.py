@@ -31,15 +31,15 @@ class Switch(NamedTuple):
 
     Attributes
     ----------
-    at : float
-        Time since the start of the motion [s].
+    time : float
+        Since the start of the motion [s].
     output : str
         Name of the output; of an event that is only a comment, its name.
     value : bool or None
         The new value; None for a comment.
     """
 
-    at: float
+    time: float
     output: str
     value: bool | None = None
 
@@ -119,7 +119,7 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        return self._motion([next(own) for own in self._segment_motions(None)])
+        return self._motion([next(motions) for motions in self._segment_motions(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
         """Return the motions of a controller, one for each interpolation between targets.
@@ -168,10 +168,12 @@ class ControllerProgram:
         """
         operations = operations_of(plan)
         names = [axis.joint for axis in self.axes]
-        known = plan.robot.joint_names
-        if sorted(names) != sorted(known):
-            raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
-        order = [names.index(name) for name in known]
+        joint_names = plan.robot.joint_names
+        if sorted(names) != sorted(joint_names):
+            raise FileFormatError(
+                f"has joints {', '.join(names)}, expected {', '.join(joint_names)}"
+            )
+        order = [names.index(name) for name in joint_names]
         worst = Deviations(NO_DEVIATION, NO_DEVIATION)
         # Time within the present operation, and its index.
         elapsed, k = 0.0, 0
@@ -184,13 +186,13 @@ class ControllerProgram:
                 )
             same = segment.in_order(order)
             operation = operations[min(k, len(operations) - 1)]
-            found = deviation_of(
+            deviation = deviation_of(
                 same, operation.motion, operation.chains, operation.motion.t[0] + elapsed
             )
             both = (
-                Deviations(NO_DEVIATION, found)
+                Deviations(NO_DEVIATION, deviation)
                 if operation.is_move
-                else Deviations(found, NO_DEVIATION)
+                else Deviations(deviation, NO_DEVIATION)
             )
             worst = worst.worse(both)
             elapsed += segment.duration

@@ -261,12 +261,12 @@ class FeedSegment(PoseSegment):
 
     def at_pace(self, travel: ArcLength) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace at which something else has gone as far."""
-        lengths = np.interp(
+        feed_times = np.interp(
             travel.at(travel.t) * (self.lengths[-1] / travel.whole),
             self.lengths,
             self.t,
         )
-        return self._driven(travel.t - travel.t[0], lengths)
+        return self._driven(travel.t - travel.t[0], feed_times)
 
     def along(self, path: Path, first: float) -> Iterator[Knots]:
         """Return the motions of `motions`, at the pace of a path that it begins at `first` [s].
@@ -313,10 +313,13 @@ class FeedSegment(PoseSegment):
                 f"the feed"
             )
 
-    def _driven(self, times: Array, own: Array) -> Iterator[Knots]:
-        """Yield the motion by each interpolation, at times where it would be at `own` times."""
+    def _driven(self, times: Array, feed_times: Array) -> Iterator[Knots]:
+        """Yield the motion of each interpolation.
+
+        At `times` it is where it is at `feed_times` without ramps, at the speeds of the program.
+        """
         for curve in self.curves:
-            yield Knots.smooth(times, self.joints(curve(own), own))
+            yield Knots.smooth(times, self.joints(curve(feed_times), feed_times))
 
     def _stepped(self, times: Array) -> Array:
         rows = linear_poses(times, self.t, self.rows)

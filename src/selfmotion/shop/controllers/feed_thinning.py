@@ -82,14 +82,14 @@ class FeedSection(PoseSection):
                 break
             nearer = replace(allowed, position=share * allowed.position)
             turning = max(free, allowed.rotation)
-            made = [
+            thinned_parts = [
                 part._fewest_targets(each, nearer, turning)
                 for part, each in zip(parts, travel, strict=True)
             ]
-            feed_segments = [segment for segment in made if isinstance(segment, FeedSegment)]
+            feed_segments = [x for x in thinned_parts if isinstance(x, FeedSegment)]
             if len(feed_segments) < len(parts):
-                # Where it is with the most that may be off.
-                stuck = stuck or next(at for at in made if not isinstance(at, FeedSegment))
+                # The time at which even the widest tolerance is exceeded.
+                stuck = stuck or next(x for x in thinned_parts if not isinstance(x, FeedSegment))
                 why = self._failure_text(stuck, allowed)
                 continue
             why = (
@@ -97,7 +97,8 @@ class FeedSection(PoseSection):
                 "the feed itself): leave more room, or take a lower feed"
             )
             if not all(
-                part._has_timely_events(own) for part, own in zip(parts, feed_segments, strict=True)
+                part._has_timely_events(segment)
+                for part, segment in zip(parts, feed_segments, strict=True)
             ):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
             elif self._is_valid(feed_segments, travel, allowed):
@@ -106,13 +107,13 @@ class FeedSection(PoseSection):
         ((timed, deviation),) = super().segments(allowed)
         return [(replace(timed, remark=f"{TIMES_HEADING}{why}"), deviation)]
 
-    def _failure_text(self, at: float, allowed: Tolerance) -> str:
+    def _failure_text(self, time: float, allowed: Tolerance) -> str:
         """Return a message: where poses at a feed exceed the tolerance, and a remedy."""
         motion = self.operation.motion
-        tool = self.operation.chains[0].place(motion(at)).translation
+        tool = self.operation.chains[0].place(motion(time)).translation
         position = ", ".join(f"{value:.3f}" for value in tool)
         return (
-            f"near t = {at - motion.t[0]:.4g} s, at ({position}) m, no poses at its feed keep it "
+            f"near t = {time - motion.t[0]:.4g} s, at ({position}) m, no poses at its feed keep it "
             f"within {1e3 * allowed.position:.3g} mm and {np.degrees(allowed.rotation):.3g}°: in "
             f"corners round them more (tolerance = 0.002), or stop there (corners = 'stop'); else "
             f"allow more (deviation), or keep away from singular poses"
@@ -121,8 +122,9 @@ class FeedSection(PoseSection):
     @property
     def _rest_times(self) -> list[float]:
         """Times at which the tool rests, from first to last [s]."""
-        at = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
-        inside = at[(at > self.first + _EVENT_TOLERANCE) & (at < self.last - _EVENT_TOLERANCE)]
+        rests = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
+        is_inside = (rests > self.first + _EVENT_TOLERANCE) & (rests < self.last - _EVENT_TOLERANCE)
+        inside = rests[is_inside]
         return [self.first, *inside.tolist(), self.last]
 
     @property
@@ -140,6 +142,7 @@ class FeedSection(PoseSection):
         return all(self._is_valid_by(parts, allowed) for parts in by_interpolation(motions))
 
     def _is_valid_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
+        """Whether the seam satisfies its constraints with the motions of one interpolation."""
         motion, begin = self.operation.motion, self.first
         rows: list[tuple[Array, Array, Array]] = []
         for t, q, qd in parts:
@@ -153,12 +156,12 @@ class FeedSection(PoseSection):
             motion.t > self.last + _EVENT_TOLERANCE,
         )
         planned = motion.t, motion.q, motion.qd
-        whole = [
-            np.concatenate([own[before], *each, own[after]])
-            for own, each in zip(planned, zip(*rows, strict=True), strict=True)
-        ]
-        judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
-        return self.operation.is_valid is not None and self.operation.is_valid(judged, allowed)
+        t, q, qd = (
+            np.concatenate([samples[before], *driven, samples[after]])
+            for samples, driven in zip(planned, zip(*rows, strict=True), strict=True)
+        )
+        driven_seam = Trajectory(t, q, qd, motion.joint_names)
+        return self.operation.is_valid is not None and self.operation.is_valid(driven_seam, allowed)
 
     def _has_timely_events(self, segment: FeedSegment) -> bool:
         """Whether there is time for the ramps, and events are on time with even ramps."""
@@ -258,8 +261,8 @@ class FeedSection(PoseSection):
         times = times_at(positions, vias, speeds)
         far = np.append(0.0, np.cumsum(step_lengths(positions, vias)))
 
-        def near(own: Array) -> Array:
-            share = np.interp(own, times, far) / far[-1]
+        def near(step_times: Array) -> Array:
+            share = np.interp(step_times, times, far) / far[-1]
             return self._configurations_at(travel, share * travel.whole)
 
         events = [

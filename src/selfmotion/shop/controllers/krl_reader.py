@@ -141,8 +141,8 @@ class KrlReader(ProgramReader):
             self._begin_block(by_poses=True)
         if not self._by_poses:
             raise self.lines.fault("PTP_SPLINE has SPTP with times")
-        own = self.settings.get("speed", 0.0) if speed is None else speed
-        if not own > 0.0:
+        tool_speed = self.settings.get("speed", 0.0) if speed is None else speed
+        if not tool_speed > 0.0:
             raise self.lines.fault("a segment without a time, expected $VEL.CP before it")
         turning = {name: self.settings.get(name, UNBOUND_TURNING) for name in _TURNINGS}
         slow = [name for name, value in turning.items() if value < UNBOUND_TURNING]
@@ -151,7 +151,7 @@ class KrlReader(ProgramReader):
                 f"$VEL.{slow[0]} is {turning[slow[0]]:g}°/s, expected at least "
                 f"{UNBOUND_TURNING:g}: a slower one holds the tool back from its speed"
             )
-        self.run.append(Target(pose, speed=own, via=via))
+        self.run.append(Target(pose, speed=tool_speed, via=via))
         self._smooth.append(is_smooth)
         if alone:
             self.stop(is_spline=is_smooth)
@@ -164,7 +164,7 @@ class KrlReader(ProgramReader):
 
     def _take_trigger(self, output: str = "", value: bool | None = None, event: str = "") -> None:
         """Take an output or event at the target that follows."""
-        self.happen(Switch(0.0, output or event.strip(), value), ahead=1)
+        self.add_switch(Switch(0.0, output or event.strip(), value), ahead=1)
 
     def _end_times(self, seconds: float) -> None:
         """Take the time of all targets, and end their motion."""
@@ -184,7 +184,7 @@ class KrlReader(ProgramReader):
         self.stop()
 
     def _check_triggers(self) -> None:
-        if any(number > len(self.run) for number, _ in self.happens):
+        if any(number > len(self.run) for number, _ in self.run_switches):
             raise self.lines.fault("a trigger has no target after it")
 
     def _check_axis_speeds(self) -> None:
@@ -199,7 +199,7 @@ class KrlReader(ProgramReader):
 
     def _check_in_time(self) -> None:
         """Refuse speeds in force that hold the tool back from the times of a block."""
-        poses = [at for at in (self.here, *(x.at for x in self.run)) if isinstance(at, Pose)]
+        poses = [place for place in self._run_places() if isinstance(place, Pose)]
         if len(poses) == len(self.run):
             # It begins at axis targets, which `stop` refuses.
             return

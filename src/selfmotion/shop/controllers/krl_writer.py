@@ -129,8 +129,8 @@ class KrlWriter(ProgramWriter):
         lines, commands = [self.line("set", speed=speeds[0])], list[str]()
         for k, speed in enumerate(speeds, 1):
             commands += self._triggers(segment, k)
-            own = {"speed": speed} if speed != speeds[0] else {}
-            commands.append(f"  {self.step(segment, k, kind, **own)}")
+            changed_speed = {"speed": speed} if speed != speeds[0] else {}
+            commands.append(f"  {self.step(segment, k, kind, **changed_speed)}")
         if count == 1 and len(commands) == 1:
             return [*lines, commands[0][2:]]
         return [*lines, self.line("pose block"), *commands, self.line("close")]

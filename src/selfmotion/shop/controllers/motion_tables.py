@@ -52,12 +52,12 @@ def motion_of_arrays(file: Path, tables: Mapping[str, Any]) -> Trajectory:
     missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
     if missing:
         raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
-    known = ("t", "q", "qd", "qdd", "joint_names")
-    unknown = [name for name in tables if name not in known]
+    keys = ("t", "q", "qd", "qdd", "joint_names")
+    unknown = [name for name in tables if name not in keys]
     if unknown:
         raise FileFormatError(
-            f"{file}: '{unknown[0]}' is not read{nearest(unknown[0], known)}; expected "
-            f"{', '.join(known)}"
+            f"{file}: '{unknown[0]}' is not read{nearest(unknown[0], keys)}; expected "
+            f"{', '.join(keys)}"
         )
     try:
         names = tuple(map(str, tables["joint_names"]))

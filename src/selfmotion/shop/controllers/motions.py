@@ -131,13 +131,13 @@ def write_motion(
         write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":
-        given = settings or ProgramSettings()
-        if given != given.streamed:
+        stream_settings = settings or ProgramSettings()
+        if stream_settings != stream_settings.streamed:
             raise ProblemError(
                 f"{path}: settings: deviation, move_deviation and axes have no effect on URScript, "
                 f"which has all joints in their order at each period; leave them out"
             )
-        _write_stream(path, plan, STREAM if rate is None else rate, given)
+        _write_stream(path, plan, STREAM if rate is None else rate, stream_settings)
         return
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
@@ -177,13 +177,13 @@ def form_of(path: Path, form: str | None) -> str:
             f"{path}: {_TIMETABLE} is the name of a job's timetable, which is no motion: "
             f"`selfmotion job FILE --out {path.name}` writes it; call the motion otherwise"
         )
-    own = ending in PROGRAMS
+    is_program = ending in PROGRAMS
     name = SUFFIXES.get(ending) if form is None else form
     if name is None or name not in FORMS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
-        found = f"suffix '{path.suffix}'" if form is None else f"format '{form}'"
-        raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
-    if PROGRAMS.get(ending, name) != name or (name in PROGRAMS.values() and not own):
+        form_text = f"suffix '{path.suffix}'" if form is None else f"format '{form}'"
+        raise FileFormatError(f"{path}: {form_text} is no format of motions: {known}, moveit")
+    if PROGRAMS.get(ending, name) != name or (name in PROGRAMS.values() and not is_program):
         # Controllers, and what reads their programs, go by the suffix.
         suffix = next((end for end, each in PROGRAMS.items() if each == name), "another suffix")
         raise FileFormatError(f"{path}: format '{name}' is written with {suffix}")
@@ -336,9 +336,9 @@ def _write_stream(
 ) -> None:
     """Write URScript with all that is to be said besides the motion."""
     motion = MotionSamples.of(plan.motion if isinstance(plan, Move) else plan.trajectory, rate)
-    happens = plan.events if isinstance(plan, Program) else ()
-    check_signals({event: seam for _, seam, event in happens}, settings)
-    events = [(int(np.searchsorted(motion.t, at - 1e-9)), event) for at, _, event in happens]
+    job_events = plan.events if isinstance(plan, Program) else ()
+    check_signals({event: seam for _, seam, event in job_events}, settings)
+    events = [(int(np.searchsorted(motion.t, time - 1e-9)), event) for time, _, event in job_events]
     joints, q = motion.robot_joints, motion.q
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 

@@ -91,20 +91,20 @@ def read_parts(files: Mapping[str, str | Path]) -> Trajectory:
     motions = {part: read_motion(file) for part, file in files.items()}
     if not motions:
         raise FileFormatError("there is no file of a part, expected part → file")
-    first, one = next(iter(motions.items()))
+    first_part, first = next(iter(motions.items()))
     for part, motion in motions.items():
-        if not np.array_equal(motion.t, one.t):
+        if not np.array_equal(motion.t, first.t):
             raise FileFormatError(
                 f"{files[part]}: has {len(motion.t)} samples over {motion.duration:.6g} s, at "
-                f"other times than {files[first]} with {len(one.t)} over {one.duration:.6g} s: "
-                f"parts that move together are written together"
+                f"other times than {files[first_part]} with {len(first.t)} over "
+                f"{first.duration:.6g} s: parts that move together are written together"
             )
     several = list(motions.values())
-    known = [motion.qdd for motion in several if motion.qdd is not None]
+    accelerations = [motion.qdd for motion in several if motion.qdd is not None]
     return Trajectory(
-        one.t,
+        first.t,
         np.hstack([motion.q for motion in several]),
         np.hstack([motion.qd for motion in several]),
         tuple(f"{part}/{name}" for part, motion in motions.items() for name in motion.joint_names),
-        np.hstack(known) if len(known) == len(several) else None,
+        np.hstack(accelerations) if len(accelerations) == len(several) else None,
     )

@@ -71,11 +71,11 @@ _KINDS = {
 
 
 def _rounding(form: str) -> Rounding:
-    written, read = _KINDS[form]
+    numbers_of, pose_of = _KINDS[form]
 
     def rounded(positions: Array, quaternions: Array) -> tuple[Array, Array]:
         poses = [
-            read(np.array(written(position, quaternion)))
+            pose_of(np.array(numbers_of(position, quaternion)))
             for position, quaternion in zip(positions, quaternions, strict=True)
         ]
         return np.array([position for position, _ in poses]), np.array(

@@ -224,22 +224,22 @@ class StepSearch:
         q = self.samples.q[section]
         seeds = np.array(q)
         seeds[:, self.frames.external] = rows[:, 7:]
-        found, converged = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], seeds)
-        largest = np.abs(found - q).max()
+        solutions, converged = self.frames.inverse_kinematics(rows[:, :3], rows[:, 3:7], seeds)
+        largest = np.abs(solutions - q).max()
         return bool(converged.all() and largest <= _TOLERANCE_SHARE * self.tolerance.free)
 
     def _interpolated(self, first: int, last: int, *, is_circular: bool) -> Array | None:
         """Return the rows of one step at the samples between; None for what is no arc."""
         section, ends = slice(first, last + 1), [first, last]
         travel, rows = self.samples.travel, self.samples.rows
-        found = linear_poses(travel[section], travel[ends], rows[ends])
+        step_rows = linear_poses(travel[section], travel[ends], rows[ends])
         if is_circular:
             via = self.samples.middle(first, last)
             arc = arc_through(rows[first, :3], via, rows[last, :3])
             if arc is None or not arc.is_meant:
                 return None
-            put_on_arcs(found, travel[section], travel[ends], rows[ends, :3], via[None])
-        return found
+            put_on_arcs(step_rows, travel[section], travel[ends], rows[ends, :3], via[None])
+        return step_rows
 
     def _poses_within(self, rows: Array, exact: Array) -> bool:
         """Whether positions, external axes and orientations are within tolerance of exact ones."""

@@ -90,9 +90,9 @@ class Comments:
     def values_of(self, kind: str) -> Iterator[dict[str, Any]]:
         """Yield the values of each comment of a kind."""
         for note in self.lines.notes:
-            found = COMMENTS.find(note, "head")
-            if found and found[0].kind == kind:
-                yield self._values(*found)
+            match = COMMENTS.find(note, "head")
+            if match and match[0].kind == kind:
+                yield self._values(*match)
 
     def _values(self, statement: Statement, texts: dict[str, str]) -> dict[str, Any]:
         return {
@@ -107,9 +107,9 @@ class Comments:
     def last_step(self) -> str:
         """Return the name of the seam or move that was begun last; "" where none was."""
         for note in reversed(self.lines.notes):
-            found = COMMENTS.find(note, "head")
-            if found and found[0].kind == "step":
-                return found[1]["text"]
+            match = COMMENTS.find(note, "head")
+            if match and match[0].kind == "step":
+                return match[1]["text"]
         return ""
 
     def take_planned_time(self) -> float | None:
@@ -119,25 +119,25 @@ class Comments:
         """
         notes = self.lines.notes
         for k in range(len(notes) - 1, -1, -1):
-            found = COMMENTS.find(notes[k], "head")
-            if found and found[0].kind == "step":
+            match = COMMENTS.find(notes[k], "head")
+            if match and match[0].kind == "step":
                 return None
-            if found and found[0].kind == "planned":
+            if match and match[0].kind == "planned":
                 del notes[k]
-                return float(self._values(*found)["seconds"])
+                return float(self._values(*match)["seconds"])
         return None
 
     def axes(self) -> dict[str, tuple[str, bool]]:
         """Return the axes that the comments state: axis → its joint, and whether that slides."""
-        said = next((str(values["text"]) for values in self.values_of("axes")), "")
+        text = next((str(values["text"]) for values in self.values_of("axes")), "")
         axes: dict[str, tuple[str, bool]] = {}
-        for item in said.split(", "):
-            found = re.fullmatch(r"([AE][1-6]) = (\S+) \[(mm|deg)\]", item)
-            if found:
-                axes[found[1]] = of_word(found[2]), found[3] == "mm"
+        for item in text.split(", "):
+            match = re.fullmatch(r"([AE][1-6]) = (\S+) \[(mm|deg)\]", item)
+            if match:
+                axes[match[1]] = of_word(match[2]), match[3] == "mm"
         names = [joint for joint, _ in axes.values()]
         if len(set(names)) < len(names):
-            raise FileFormatError(f"{self.lines.file}: two axes are the same joint: {said[:200]}")
+            raise FileFormatError(f"{self.lines.file}: two axes are the same joint: {text[:200]}")
         return axes
 
     def facts(self) -> ProgramFacts | None:
@@ -165,11 +165,11 @@ class Comments:
 
     def program_frames(self, tool: SE3 | None, work: SE3 | None) -> ProgramFrames:
         """Return the frames of poses by the comments and by the program's own declarations."""
-        found = ProgramFrames(tool=tool, work=work)
+        frames = ProgramFrames(tool=tool, work=work)
         for values in self.values_of("poses"):
-            found.work_name, found.carrier = values["work"], values["carrier"]
-            found.flange = values["flange"]
+            frames.work_name, frames.carrier = values["work"], values["carrier"]
+            frames.flange = values["flange"]
         for values in self.values_of("planned work object"):
             if len(values["pose"]) == 7 and any(values["pose"][3:]):
-                found.planned = pose_of_values(values["pose"])
-        return found
+                frames.planned = pose_of_values(values["pose"])
+        return frames

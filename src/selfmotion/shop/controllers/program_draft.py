@@ -84,10 +84,10 @@ def drafted(
     check_controller(plan.robot, form, settings)
     robot, operations = plan.robot, operations_of(plan)
     axes = axes_of(robot, settings)
-    happens = {event: item.name for item in operations for _, event in item.events}
-    check_signals(happens, settings)
+    event_seams = {event: item.name for item in operations for _, event in item.events}
+    check_signals(event_seams, settings)
     slides = np.array([axis.slides for axis in axes])
-    given = operations, slides, settings.deviation, settings.move_deviation, progress
+    arguments = operations, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
     if settings.by_poses:
         of_path = settings.work_object == OF_PATH
@@ -102,23 +102,23 @@ def drafted(
             posed: PosedSections = partial(section, frames=frames, rounding=ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
-            segments, deviation = segments_of(*given, posed)
+            segments, deviation = segments_of(*arguments, posed)
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
         frames = None
-        segments, deviation = segments_of(*given)
+        segments, deviation = segments_of(*arguments)
     order = in_order(axes)
-    sorted_ones = tuple(item.in_order(order) for item in segments)
+    sorted_segments = tuple(item.in_order(order) for item in segments)
     ordered = tuple(axes[k] for k in order)
     stated = Deviations(deviation.path.stated, deviation.moves.stated)
-    at_speeds = any(isinstance(item, FeedSegment) for item in sorted_ones)
+    at_speeds = any(isinstance(item, FeedSegment) for item in sorted_segments)
     within = settings.deviation if at_speeds else None
     program = ControllerProgram(
-        name, ordered, sorted_ones, stated, remark=plain(why), within=within
+        name, ordered, sorted_segments, stated, remark=plain(why), within=within
     )
     tool = tool_from_flange(robot, settings)
-    facts = ProgramFacts.of(robot, settings, list(happens), by_poses=frames is not None)
+    facts = ProgramFacts.of(robot, settings, list(event_seams), by_poses=frames is not None)
     if settings.mass is not None:
         load = Load(settings.mass, np.array(settings.center))
         check_load(load, robot, constraints_of(plan), facts.flange)

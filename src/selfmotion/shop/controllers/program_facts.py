@@ -124,26 +124,28 @@ class ProgramFacts:
     @classmethod
     def stated(cls, notes: Sequence[str]) -> "ProgramFacts | None":
         """Return those that the comments of a program state; None where they state none."""
-        said = {key: note.removeprefix(key) for note in notes for key in _FACTS if _is(note, key)}
+        statements = {
+            key: note.removeprefix(key) for note in notes for key in _FACTS if _is(note, key)
+        }
         sums = [note.removeprefix(_CHECKSUM) for note in notes if _is(note, _CHECKSUM)]
-        if not (said or sums):
+        if not (statements or sums):
             return None
         changed = sums != [checksum(notes)]
         try:
-            flange = str(json.loads(said.get(_FLANGE, '""')))
-            approach = float(json.loads(said.get(_APPROACH, "1.0")))
-            carried = json.loads(said.get(_LOAD, "null"))
+            flange = str(json.loads(statements.get(_FLANGE, '""')))
+            approach = float(json.loads(statements.get(_APPROACH, "1.0")))
+            carried = json.loads(statements.get(_LOAD, "null"))
             load = None
             if carried is not None:
                 load = Load(float(carried[0]), np.array([float(x) for x in carried[1:4]]))
-            held = {name: float(x) for name, x in json.loads(said.get(_HELD, "{}")).items()}
+            held = {name: float(x) for name, x in json.loads(statements.get(_HELD, "{}")).items()}
             outputs = {
                 event: None if value is None else (str(value[0]), bool(value[1]))
-                for event, value in json.loads(said.get(_OUTPUTS, "{}")).items()
+                for event, value in json.loads(statements.get(_OUTPUTS, "{}")).items()
             }
         except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
             return cls(is_changed=True)
-        return cls(flange, held, outputs, said.get(_UNIT, ""), load, approach, changed)
+        return cls(flange, held, outputs, statements.get(_UNIT, ""), load, approach, changed)
 
     @property
     def notes(self) -> list[str]:
@@ -157,25 +159,35 @@ class ProgramFacts:
         return [*parts, f"{_APPROACH}{json.dumps(self.approach)}"]
 
     def against(self, robot: RobotModel, load: Load | None) -> Iterator[str]:
-        """Yield what of it is not as an arm has it, or as the program says its load."""
+        """Yield the facts that differ from an arm's held joints or from the program's own load."""
         if self.is_changed:
             yield (
                 "what its head states (axes, deviations, held joints, outputs, frames) was changed "
                 "by hand, as its checksum tells: write the program again"
             )
             return
-        known = (load is None) == (self.load is None)
-        if not known or (load and self.load and not load.is_like(self.load)):
+        yield from self._load_fault(load)
+        yield from self._held_joint_faults(robot)
+
+    def _load_fault(self, load: Load | None) -> Iterator[str]:
+        """Yield that the load of the program is another one than it was written with."""
+        is_only_one_stated = (load is None) != (self.load is None)
+        if is_only_one_stated or (load and self.load and not load.is_like(self.load)):
             now, before = ("no load" if x is None else str(x) for x in (load, self.load))
             yield f"it says that the flange carries {now}, it was written with {before}"
+
+    def _held_joint_faults(self, robot: RobotModel) -> Iterator[str]:
+        """Yield the joints that are held in the program alone, in the arm alone, or elsewhere."""
         for name in sorted({*self.held, *robot.locked}):
-            here, there = self.held.get(name), robot.locked.get(name)
-            if here is None:
+            written, current = self.held.get(name), robot.locked.get(name)
+            if written is None:
                 yield f"it was written for an arm whose joint '{name}' is not held"
-            elif there is None:
-                yield f"it was written with joint '{name}' held at {here:.6g}, here it is not held"
-            elif abs(here - there) > _DIGITS:
-                yield f"it was written with joint '{name}' held at {here:.6g}, here at {there:.6g}"
+                continue
+            statement = f"it was written with joint '{name}' held at {written:.6g}"
+            if current is None:
+                yield f"{statement}, here it is not held"
+            elif abs(written - current) > _DIGITS:
+                yield f"{statement}, here at {current:.6g}"
 
 
 def with_checksum(notes: Sequence[str]) -> list[str]:
@@ -214,11 +226,11 @@ def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange:
     if not held:
         return []
     settings = ProgramSettings(flange=flange or None)
-    tool, own = tool_from_flange(robot, settings), _beyond(robot, flange)
-    found = []
+    tool, link_loads = tool_from_flange(robot, settings), _beyond(robot, flange)
+    loads = []
     for mass, center in held:
-        found.append(_together([*own, Load(mass, np.asarray(tool.act(center)))]))
-    return found
+        loads.append(_together([*link_loads, Load(mass, np.asarray(tool.act(center)))]))
+    return loads
 
 
 def check_load(
@@ -253,7 +265,7 @@ def _beyond(robot: RobotModel, flange: str) -> list[Load]:
         parent, child = joint.find("parent"), joint.find("child")
         if parent is not None and child is not None:
             children.setdefault(parent.get("link", ""), []).append(child.get("link", ""))
-    links, found = [flange], list[Load]()
+    links, loads = [flange], list[Load]()
     while links:
         name = links.pop()
         links += [each for each in children.get(name, ()) if robot.carrier_of(each)[0] == carrier]
@@ -264,9 +276,9 @@ def _beyond(robot: RobotModel, flange: str) -> list[Load]:
         origin = element.find("origin")
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         center = np.array([float(value) for value in text.split()])
-        at: SE3 = place.inverse() * robot.carrier_of(name)[1]
-        found.append(Load(float(mass.get("value", "0")), np.asarray(at.act(center))))
-    return found
+        link_pose: SE3 = place.inverse() * robot.carrier_of(name)[1]
+        loads.append(Load(float(mass.get("value", "0")), np.asarray(link_pose.act(center))))
+    return loads
 
 
 def _together(loads: Sequence[Load]) -> Load:

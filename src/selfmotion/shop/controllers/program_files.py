@@ -47,15 +47,15 @@ def write_program(
     moves first.
     """
     verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    given = plan, file.stem, form, settings, verdict, progress
-    draft = drafted(*given)
+    arguments = plan, file.stem, form, settings, verdict, progress
+    draft = drafted(*arguments)
     for moves_only in (True, False):
         if draft.frames is None:
             break
         why = _lost(plan, file, form, draft)
         if not why:
             break
-        draft = drafted(*given, Joints(moves_only, why))
+        draft = drafted(*arguments, Joints(moves_only, why))
     _WRITERS[form](file, draft)
 
 
@@ -65,17 +65,17 @@ def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft:
         trial = FilePath(folder) / file.name
         _WRITERS[form](trial, draft)
         try:
-            _, stated, found = program_deviation(plan, trial)
+            _, stated, measured = program_deviation(plan, trial)
         except FileFormatError as error:
             return f"read again, {str(error).removeprefix(f'{trial}: ')}"
-    if keeps_stated(found, stated):
+    if keeps_stated(measured, stated):
         return ""
     return "read again, poses leave the motion: the arm is singular, or nearly so"
 
 
-def keeps_stated(found: Deviations, stated: Deviations) -> bool:
-    """Whether a program is no farther off its motion than it states, in the digits of files."""
-    pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
+def keeps_stated(measured: Deviations, stated: Deviations) -> bool:
+    """Whether deviations are at most those that a file states, up to its digits."""
+    pairs = zip((*measured.path, *measured.moves), (*stated.path, *stated.moves), strict=True)
     return all(one <= other + 1e-9 for one, other in pairs)
 
 
@@ -93,7 +93,7 @@ def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerP
 def program_deviation(
     plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
 ) -> tuple[int, Deviations, Deviations]:
-    """Return the contents of a program file: targets, the deviations it states, and its kind.
+    """Return the number of targets of a program file, the deviations it states, and those it has.
 
     The file is read unless it was `read` before.
 
@@ -102,8 +102,8 @@ def program_deviation(
     FileFormatError
         The file cannot be read, or is of another motion.
     """
-    found = read or read_program(file, plan.robot)
+    program = read or read_program(file, plan.robot)
     try:
-        return found.targets, found.deviation, found.deviation_of(plan)
+        return program.targets, program.deviation, program.deviation_of(plan)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error

@@ -31,7 +31,7 @@ class Target:
 
     Attributes
     ----------
-    at : list of float or Pose
+    place : list of float or Pose
         Axes [deg or mm], or a tool pose.
     seconds : float
         Time from the target before [s]; 0 where it has a speed.
@@ -43,7 +43,7 @@ class Target:
         Of the tool [m/s²]; infinite where the program does not state it.
     """
 
-    at: list[float] | Pose
+    place: list[float] | Pose
     seconds: float = 0.0
     speed: float = 0.0
     via: Pose | None = None
@@ -51,7 +51,7 @@ class Target:
 
     def is_like(self, other: "Target") -> bool:
         """Whether both are axes or both poses, and both have times or both speeds."""
-        same_kind = isinstance(self.at, Pose) == isinstance(other.at, Pose)
+        same_kind = isinstance(self.place, Pose) == isinstance(other.place, Pose)
         return same_kind and (self.speed > 0.0) == (other.speed > 0.0)
 
 
@@ -84,10 +84,10 @@ class ProgramReader:
         # Time of the motion up to the last stop [s].
         self.clock = 0.0
         # Target at which the arm stopped last; None before the first one.
-        self.here: list[float] | Pose | None = None
+        self.last_stop: list[float] | Pose | None = None
         # Targets since then, and what is switched at which of them.
         self.run: list[Target] = []
-        self.happens: list[tuple[int, Switch]] = []
+        self.run_switches: list[tuple[int, Switch]] = []
         self.switches: list[Switch] = []
         # What statements have set: of each value the last one, by its name.
         self.settings: dict[str, Any] = {}
@@ -115,10 +115,10 @@ class ProgramReader:
         actions = self.actions()
         for line in self.lines:
             text = " ".join(line.split())
-            found = self.language.find(text, self.state)
-            if found is None:
+            match = self.language.find(text, self.state)
+            if match is None:
                 raise self.lines.fault(self._unread(text))
-            statement, texts = found
+            statement, texts = match
             self.check(statement.kind)
             values: dict[str, Any] = {
                 name: self.language.fields[field].read(self, texts[name])
@@ -146,10 +146,12 @@ class ProgramReader:
         FileFormatError
             Something is missing, or the arm cannot follow.
         """
-        said, present, file = self.comments.axes(), self.axes, self.lines.file
+        stated_axes, present, file = self.comments.axes(), self.axes, self.lines.file
         # Robots of fewer axes have numbers in the places of those they lack.
-        columns = [k for k, axis in enumerate(present) if axis in said or not said]
-        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in columns)
+        columns = [k for k, axis in enumerate(present) if axis in stated_axes or not stated_axes]
+        axes = tuple(
+            Axis(present[k], *stated_axes.get(present[k], (present[k], False))) for k in columns
+        )
         if not axes:
             raise FileFormatError(f"{file}: has no axes of those that its comments name")
         self._check_unnamed(columns)
@@ -251,24 +253,24 @@ class ProgramReader:
 
     def switch_output(self, output: str, value: bool) -> None:
         """Take an output that is switched at the last target."""
-        self.happen(Switch(0.0, output, value))
+        self.add_switch(Switch(0.0, output, value))
 
     def pass_event(self, event: str) -> None:
         """Take an event that is a comment at the last target."""
-        self.happen(Switch(0.0, event.strip()))
+        self.add_switch(Switch(0.0, event.strip()))
 
-    def happen(self, switch: Switch, ahead: int = 0) -> None:
+    def add_switch(self, switch: Switch, ahead: int = 0) -> None:
         """Take an output or event at the last target, or at one that is `ahead`."""
         if self.run or ahead:
-            self.happens.append((len(self.run) + ahead, switch))
+            self.run_switches.append((len(self.run) + ahead, switch))
         else:
-            self.switches.append(switch._replace(at=self.clock))
+            self.switches.append(switch._replace(time=self.clock))
 
     def approach(self, target: list[float] | Pose) -> None:
         """Take where the arm begins, or goes slowly before targets of the other kind."""
         self.check_stopped("a slow motion")
         self.rows.append(Row("", [target], [], is_slow=True))
-        self.here = target
+        self.last_stop = target
 
     def take(self, target: Target, *, stops: bool) -> None:
         """Take a target, and end the motion where the arm `stops` there.
@@ -286,20 +288,20 @@ class ProgramReader:
 
     def stop(self, *, is_spline: bool = False) -> None:
         """End a motion at its last target, at which the arm stops."""
-        run, happens, self.run, self.happens = self.run, self.happens, [], []
+        run, switches, self.run, self.run_switches = self.run, self.run_switches, [], []
         times = self._paced(run, is_spline=is_spline) if run[0].speed else self._timed(run)
-        for number, switch in happens:
-            self.switches.append(switch._replace(at=self.clock + times[number]))
+        for number, switch in switches:
+            self.switches.append(switch._replace(time=self.clock + times[number]))
         self.clock += sum(self.rows[-1].seconds)
-        self.here = run[-1].at
+        self.last_stop = run[-1].place
 
     def _timed(self, run: list[Target]) -> list[float]:
         """Add a motion at times; return when its targets are reached [s]."""
         seconds = [target.seconds for target in run]
-        self.rows.append(Row(self.comments.last_step(), self._every(run), seconds))
+        self.rows.append(Row(self.comments.last_step(), self._places_of(run), seconds))
         return [sum(seconds[:k]) for k in range(len(run) + 1)]
 
-    def _every(self, run: list[Target]) -> list[list[float] | Pose]:
+    def _places_of(self, run: list[Target]) -> list[list[float] | Pose]:
         """Return where a motion begins, and its targets.
 
         Raises
@@ -307,12 +309,16 @@ class ProgramReader:
         FileFormatError
             It begins at a target of the other kind.
         """
-        begins_by_pose, by_poses = isinstance(self.here, Pose), isinstance(run[0].at, Pose)
-        if self.here is None or begins_by_pose != by_poses:
+        begins_by_pose, by_poses = isinstance(self.last_stop, Pose), isinstance(run[0].place, Pose)
+        if self.last_stop is None or begins_by_pose != by_poses:
             kinds = ("a pose", "axis targets")
-            given, before = kinds if by_poses else kinds[::-1]
-            raise self.lines.fault(f"{given} after {before}, expected a slow motion there first")
-        return [self.here, *(target.at for target in run)]
+            kind, before = kinds if by_poses else kinds[::-1]
+            raise self.lines.fault(f"{kind} after {before}, expected a slow motion there first")
+        return [self.last_stop, *(target.place for target in run)]
+
+    def _run_places(self) -> list[list[float] | Pose | None]:
+        """Return where the motion that is read begins, and its targets so far."""
+        return [self.last_stop, *(target.place for target in self.run)]
 
     def _paced(self, run: list[Target], *, is_spline: bool) -> list[float]:
         """Add a motion at speeds; return when its targets are reached, by even ramps [s].
@@ -320,7 +326,7 @@ class ProgramReader:
         Ramps are the controller's, but the seam between them is judged at its feed.
         """
         planned = self.comments.take_planned_time()
-        every = self._every(run)
+        places = self._places_of(run)
         if planned is None:
             raise self.lines.fault(
                 f"a motion at a speed needs the comment '{DURATION_HEADING}… s' before it, which "
@@ -328,28 +334,30 @@ class ProgramReader:
             )
         speeds = [target.speed for target in run]
         vias = np.array([[np.nan] * 3 if x.via is None else x.via.position for x in run])
-        own = times_at(np.array([x.position for x in every if isinstance(x, Pose)]), vias, speeds)
-        if not (np.diff(own) > 0.0).all():
-            k = int(np.argmin(np.diff(own)))
+        feed_times = times_at(
+            np.array([x.position for x in places if isinstance(x, Pose)]), vias, speeds
+        )
+        if not (np.diff(feed_times) > 0.0).all():
+            k = int(np.argmin(np.diff(feed_times)))
             raise self.lines.fault(
                 f"target {k + 1} of a seam at its speed is where the one before is, expected a way "
                 f"to go: at a speed a step of no length takes no time"
             )
-        if not 0.0 < own[-1] < planned:
+        if not 0.0 < feed_times[-1] < planned:
             raise self.lines.fault(
-                f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
+                f"at these speeds it takes {feed_times[-1]:.6g} s without ramps, planned are "
                 f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
             )
         # Half of the length to come to the slowest of its speeds, half to stop.
-        least = min(speeds) ** 2 / float(np.diff(own) @ np.array(speeds))
+        least = min(speeds) ** 2 / float(np.diff(feed_times) @ np.array(speeds))
         acceleration = min(target.acceleration for target in run)
         if not acceleration >= (1.0 - _ROUNDED) * least:
             raise self.lines.fault(
                 f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
                 f"less the tool never is at its speed"
             )
-        self.rows.append(Row(self.comments.last_step(), every, [planned], speeds, vias, is_spline))
-        times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
+        self.rows.append(Row(self.comments.last_step(), places, [planned], speeds, vias, is_spline))
+        times: list[float] = Ramps(float(feed_times[-1]), planned).times(feed_times).tolist()
         return times
 
     def check_stopped(self, what: str) -> None:
@@ -359,13 +367,13 @@ class ProgramReader:
 
     def external_axes(self, values: Mapping[str, float]) -> list[float]:
         """Return the external axes of a pose, which are those of the axis target before."""
-        known = [name for name in self.axes if name.startswith("E")]
-        if sorted(values) != sorted(known):
+        expected = [name for name in self.axes if name.startswith("E")]
+        if sorted(values) != sorted(expected):
             raise self.lines.fault(
                 f"has external axes {', '.join(values) or 'none'}, expected "
-                f"{', '.join(known) or 'none'}"
+                f"{', '.join(expected) or 'none'}"
             )
-        return [values[name] for name in known]
+        return [values[name] for name in expected]
 
     def check_axes(self, names: list[str]) -> None:
         """Refuse a target with other axes than those before."""

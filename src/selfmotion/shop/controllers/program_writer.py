@@ -152,7 +152,7 @@ class ProgramWriter(ABC):
         axes = self.axes(segment, k)
         return WrittenPose(segment.positions[k], segment.quaternions[k], axes, configuration)
 
-    def positioner(self, kind: type[int] | type[str], said: str) -> Any:
+    def positioner(self, kind: type[int] | type[str], hint: str) -> Any:
         """Return the mechanical unit that carries the work object.
 
         Raises
@@ -164,7 +164,7 @@ class ProgramWriter(ABC):
         if frames is None or not isinstance(unit, kind):
             name = "" if frames is None else frames.name
             raise ProblemError(
-                f"{self.draft.robot.name}: an axis carries work object '{name}', and {said}, in "
+                f"{self.draft.robot.name}: an axis carries work object '{name}', and {hint}, in "
                 f"the file of --settings (ProgramSettings(positioner=…))"
             )
         return unit

@@ -71,8 +71,9 @@ def _read_speeds(reader: ProgramReader, text: str) -> list[float]:
 
 def _read_axes(reader: ProgramReader, text: str) -> list[float]:
     robot, external = re.findall(_LIST, text)
-    own, outer = _texts(reader, robot, 6, "robax"), _texts(reader, external, 6, "extax")
-    every = dict(zip(AXES, [*own, *outer], strict=True))
+    robot_axes = _texts(reader, robot, 6, "robax")
+    external_axes = _texts(reader, external, 6, "extax")
+    every = dict(zip(AXES, [*robot_axes, *external_axes], strict=True))
     present = [name for name, item in every.items() if not _is_absent(reader, name, item)]
     reader.check_axes(present)
     return [reader.lines.coordinate(every[name]) for name in present]
@@ -113,8 +114,8 @@ def _write_lists(*lists: Sequence[str]) -> str:
 
 def _write_axes(axes: Mapping[str, str]) -> str:
     # A robot of fewer than six axes has 0 in their place.
-    own = [axes.get(name, "0") for name in AXES[:6]]
-    return _write_lists(own, [axes.get(name, _ABSENT) for name in AXES[6:]])
+    robot_axes = [axes.get(name, "0") for name in AXES[:6]]
+    return _write_lists(robot_axes, [axes.get(name, _ABSENT) for name in AXES[6:]])
 
 
 def _write_pose(pose: WrittenPose) -> str:

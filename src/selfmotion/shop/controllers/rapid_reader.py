@@ -53,8 +53,8 @@ class RapidReader(ProgramReader):
     def work(self) -> SE3 | None:
         if "object" not in self.settings:
             return None
-        user, own = self.settings["user"], self.settings["object"]
-        return user * own if self.settings["fixed"] else own
+        user, object_frame = self.settings["user"], self.settings["object"]
+        return user * object_frame if self.settings["fixed"] else object_frame
 
     @property
     @override
@@ -79,12 +79,13 @@ class RapidReader(ProgramReader):
 
     def _approach(self, target: list[float] | Pose, speed: str) -> None:
         """Take a slow motion; nothing has judged one that is faster than those."""
-        known, most = self._speeds.get(speed.lower()), (FASTEST, APPROACH_TURNING) * 2
-        if known is None or any(x > least for x, least in zip(known, most, strict=True)):
-            found = "none of the module" if known is None else _in_words(known)
+        speeds, limits = self._speeds.get(speed.lower()), (FASTEST, APPROACH_TURNING) * 2
+        if speeds is None or any(x > most for x, most in zip(speeds, limits, strict=True)):
+            speed_text = "none of the module" if speeds is None else _in_words(speeds)
             raise self.lines.fault(
-                f"a motion to where the program goes on has speed '{speed}' ({found}), expected a "
-                f"speeddata of the module of at most {_in_words(most)}: nothing has judged it"
+                f"a motion to where the program goes on has speed '{speed}' ({speed_text}), "
+                f"expected a speeddata of the module of at most {_in_words(limits)}: nothing has "
+                f"judged it"
             )
         self.approach(target)
 
@@ -127,11 +128,11 @@ class RapidReader(ProgramReader):
 
     def _check_name(self, kind: str, name: str) -> None:
         """Refuse another tool or work object than that of the module."""
-        known = str(self.settings.get(kind, ""))
-        if name.lower() != known.lower():
+        expected = str(self.settings.get(kind, ""))
+        if name.lower() != expected.lower():
             what = "tool" if kind == "tool" else "work object"
             raise self.lines.fault(
-                f"{what} is '{name}', expected '{known}', the one that the module has"
+                f"{what} is '{name}', expected '{expected}', the one that the module has"
             )
 
     def _check_judged(self, speed: str, zone: str, *, is_round: bool) -> None:
@@ -144,7 +145,7 @@ class RapidReader(ProgramReader):
                 f"rounded by {1e3 * ZONE:g} mm at most"
             )
         turning = self._speeds[speed.lower()][1:]
-        if any(own < least for own, least in zip(turning, TURNING, strict=True)):
+        if any(value < least for value, least in zip(turning, TURNING, strict=True)):
             raise self.lines.fault(
                 f"speeddata '{speed}' has {_in_words(turning)} for turning and external axes, "
                 f"expected at least {_in_words(TURNING)}: slower ones hold the tool back from its "

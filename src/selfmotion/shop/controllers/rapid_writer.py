@@ -116,8 +116,8 @@ class RapidWriter(ProgramWriter):
         first = next((x for x in self.program.segments if isinstance(x, PoseSegment)), None)
         if first is None:
             return []
-        known = confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None
-        return [] if known else _UNKNOWN_CONFIGURATION
+        is_known = confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None
+        return [] if is_known else _UNKNOWN_CONFIGURATION
 
     def _tool(self) -> str:
         x, y, z = (1e3 * value for value in self.draft.settings.center)

@@ -137,8 +137,8 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
                 f"{file}: points[{k}]: {counts[0]} positions, {counts[1]} velocities and "
                 f"{counts[2]} accelerations for {len(names)} joints"
             )
-        for what, given in (("velocities", qd), ("accelerations", qdd)):
-            if bool(given[-1]) != bool(given[0]):
+        for what, values in (("velocities", qd), ("accelerations", qdd)):
+            if bool(values[-1]) != bool(values[0]):
                 raise FileFormatError(
                     f"{file}: points[{k}]: {what} are given for some points only; give all, or none"
                 )
@@ -172,8 +172,8 @@ def _straight(points: Trajectory) -> tuple[Array, Array, Array, tuple[str, ...]]
 
 def _values(point: Mapping[str, Any], key: str) -> list[float]:
     """Return numbers of a point; empty lists are absent ones, but for positions."""
-    given = point[key] if key == "positions" else point.get(key)
-    return [float(value) for value in given or []]
+    numbers = point[key] if key == "positions" else point.get(key)
+    return [float(value) for value in numbers or []]
 
 
 # ROS 2 bags (MCAP): joint states and the tool's frame, for Foxglove, PlotJuggler and ``ros2
@@ -320,18 +320,18 @@ def motion_of_bag(file: Path) -> Trajectory:
     try:
         with file.open("rb") as stream:
             reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-            found = [message for *_, message in reader.iter_decoded_messages([STATES])]
+            states = [message for *_, message in reader.iter_decoded_messages([STATES])]
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror}") from error
     except spoilt as error:
         raise FileFormatError(f"{file}: is no bag of ROS 2 messages: {error}") from error
-    names = {tuple(state.name) for state in found}
+    names = {tuple(state.name) for state in states}
     if len(names) != 1:
         count = "no" if not names else "several sets of"
         raise FileFormatError(f"{file}: has {count} joint names on {STATES}, expected one")
-    stamps = [_NANO * s.header.stamp.sec + s.header.stamp.nanosec for s in found]
+    stamps = [_NANO * s.header.stamp.sec + s.header.stamp.nanosec for s in states]
     t = np.array([at - stamps[0] for at in stamps]) / _NANO
-    q, qd = (np.array([getattr(s, each) for s in found]) for each in ("position", "velocity"))
+    q, qd = (np.array([getattr(s, each) for s in states]) for each in ("position", "velocity"))
     try:
         return Trajectory(t, q, qd, names.pop())
     except (FileFormatError, TypeError, ValueError) as error:

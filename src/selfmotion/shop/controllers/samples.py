@@ -63,8 +63,8 @@ class MotionSamples:
         if rate is None:
             t = np.round(motion.t - motion.t[0], _DIGITS)
         else:
-            known = isinstance(rate, Real) and np.isfinite(float(rate))
-            if not (known and 1.0 <= rate * motion.duration <= MAX_SAMPLES):
+            is_finite = isinstance(rate, Real) and np.isfinite(float(rate))
+            if not (is_finite and 1.0 <= rate * motion.duration <= MAX_SAMPLES):
                 raise ProblemError(
                     f"rate is {shown(rate)} Hz, expected a number above "
                     f"{1.0 / motion.duration:.4g} and up to {MAX_SAMPLES / motion.duration:.4g}, "
@@ -116,7 +116,15 @@ def linear_deviation(plan: Plan, rate: float | None = None) -> LinearDeviation:
 
 
 def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
-    """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
+    """Return how far straight lines between samples leave a motion.
+
+    Returns
+    -------
+    deviations : (K, 2)
+        Of the tool on each interval: position [m], rotation [rad].
+    intervals : (K,)
+        Durations between samples [s].
+    """
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
     intervals = np.diff(samples.t)
@@ -125,12 +133,13 @@ def _deviations(plan: Plan, rate: float | None) -> tuple[Array, Array]:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * intervals, motion.t[-1])
         straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
         for chain in chains:
-            (_, turned, here), (_, facing, there) = chain.along(straight), chain.along(exact)
-            far = np.linalg.norm(here - there, axis=1)
+            _, rotations, positions = chain.along(straight)
+            _, exact_rotations, exact_positions = chain.along(exact)
+            distance = np.linalg.norm(positions - exact_positions, axis=1)
             # |R - R'| is 2√2 sin(angle / 2).
-            half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
+            half = np.linalg.norm(rotations - exact_rotations, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
-            deviations = np.maximum(deviations, np.stack([far, angle], axis=1))
+            deviations = np.maximum(deviations, np.stack([distance, angle], axis=1))
     return deviations, intervals
 
 
@@ -147,8 +156,8 @@ def _rate_that_keeps(plan: Plan) -> float | None:
         deviations, intervals = _deviations(plan, rate)
         share = (deviations / [tolerance.position, tolerance.rotation]).max(axis=1)
         # The miss of a line over a span h is that of a parabola: it grows with h².
-        found = float(np.ceil((np.sqrt(share) / intervals).max()))
-        return max(found, lowest), bool(share.max() <= 1.0)
+        needed_rate = float(np.ceil((np.sqrt(share) / intervals).max()))
+        return max(needed_rate, lowest), bool(share.max() <= 1.0)
 
     # The samples of the plan itself lie too far apart for more than a first guess.
     rate, _ = needed(None)
@@ -177,8 +186,8 @@ def coarsest_rate(plan: Plan) -> float | None:
         return None
     samples = MotionSamples.of(motion, rate)
     coarse = Trajectory(samples.t, samples.q, samples.qd, motion.joint_names, samples.qdd)
-    found = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
-    return rate if found.verified else None
+    certificate = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
+    return rate if certificate.verified else None
 
 
 def within_limits_at(plan: Plan, rate: float | None) -> Plan:
@@ -190,8 +199,8 @@ def within_limits_at(plan: Plan, rate: float | None) -> Plan:
     if rate is None or not (is_retimed(plan) and plan.certificate.verified):
         return plan
     samples = MotionSamples.of(plan.trajectory, rate)
-    read = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
-    if plan.problem.certify(read, plan.tolerance, plan.report.ending).verified:
+    sampled = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
+    if plan.problem.certify(sampled, plan.tolerance, plan.report.ending).verified:
         return plan
     slower = at_rate(plan, rate)
     return slower if slower.certificate.verified else plan
@@ -263,6 +272,6 @@ def moving_ends(plan: Plan | Parts | Move | Program) -> str:
 
 def check_ends(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
     """Raise PlanError for a motion that begins or ends moving unasked, unless it is forced."""
-    said = "" if force else moving_ends(plan)
-    if said:
-        raise PlanError(f"{file}: is not written: {said}, or give force=True to write it as it is")
+    fault = "" if force else moving_ends(plan)
+    if fault:
+        raise PlanError(f"{file}: is not written: {fault}, or give force=True to write it as it is")

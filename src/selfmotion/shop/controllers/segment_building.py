@@ -187,8 +187,8 @@ class SegmentBuilder:
         None where the file has no poses.
     segments : list of Segment
         Segments so far.
-    at : (n,) or None
-        Current configuration.
+    last_q : (n,) or None
+        Configuration in which the rows so far end; None before the first.
     start_gap : float
         Joint distance from the first axis target to the first pose [rad or m].
     """
@@ -197,7 +197,7 @@ class SegmentBuilder:
     axes: tuple[Axis, ...]
     frames: ToolFrames | None
     segments: list[Segment] = field(default_factory=list)
-    at: Array | None = None
+    last_q: Array | None = None
     start_gap: float = 0.0
 
     def add(self, row: Row) -> None:
@@ -215,13 +215,13 @@ class SegmentBuilder:
             segment: Segment = self._segment(row)
         else:
             t = times_of(row.seconds)
-            if not row.axes and self.at is None:
+            if not row.axes and self.last_q is None:
                 raise FileFormatError(f"{self.file}: rests before it has a target")
             values = np.array(row.axes, dtype=np.float64)
-            q = self.in_si(values) if row.axes else np.array([self.at] * len(t))
+            q = self.in_si(values) if row.axes else np.array([self.last_q] * len(t))
             segment = Segment(row.name, t, q)
         self.segments.append(segment)
-        self.at = segment.q[-1]
+        self.last_q = segment.q[-1]
 
     def in_si(self, values: Array, columns: Sequence[int] | None = None) -> Array:
         """Return coordinates in rad or m."""
@@ -229,12 +229,12 @@ class SegmentBuilder:
         return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
 
     def _add_slow_motion(self, row: Row) -> None:
-        before, (target,) = self.at, row.targets
+        before, (target,) = self.last_q, row.targets
         if not isinstance(target, Pose):
-            self.at = self.in_si(np.array(target, dtype=np.float64))
-            if before is not None and np.abs(self.at - before).max() > _SAME_PLACE:
-                seconds = float(np.abs(self.at - before).max()) / _SLOW_SPEED
-                both = np.array([before, self.at])
+            self.last_q = self.in_si(np.array(target, dtype=np.float64))
+            if before is not None and np.abs(self.last_q - before).max() > _SAME_PLACE:
+                seconds = float(np.abs(self.last_q - before).max()) / _SLOW_SPEED
+                both = np.array([before, self.last_q])
                 self.segments.append(Segment(_SLOW_NAME, times_of([seconds]), both, is_slow=True))
             return
         frames, _ = self._frames_and_order()
@@ -246,14 +246,14 @@ class SegmentBuilder:
         # Slowly from where the arm is, however far that is.
         seconds = max(far / _SLOW_SPEED, angle / _SLOW_SPEED, _SHORTEST)
         moves = bool(self.segments) and max(far, angle) > _SAME_PLACE
-        here = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
-        slow = self._segment(Row(_SLOW_NAME, [here, target], [seconds]))
+        begin = Pose(position[0], quaternion[0], self._external_axes(before), target.line)
+        slow = self._segment(Row(_SLOW_NAME, [begin, target], [seconds]))
         segment = replace(slow, is_slow=True)
         if not self.segments:
             self.start_gap = float(np.abs(segment.q[-1] - before).max())
         if moves:
             self.segments.append(segment)
-        self.at = segment.q[-1]
+        self.last_q = segment.q[-1]
 
     def _segment(self, row: Row) -> PoseSegment:
         """Return the segment of poses, with joints by inverse kinematics from the current ones."""
@@ -276,23 +276,23 @@ class SegmentBuilder:
         rows = linear_poses(times, t, np.hstack([positions, quaternions, external]))
         if at_speeds:
             put_on_arcs(rows, times, t, positions, row.vias)
-        if self.at is None:
+        if self.last_q is None:
             raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
-        q = self._inverse_kinematics(frames, rows, self._by_robot(self.at[None])[0], row, count)
-        every = q[np.arange(0, len(times), count)]
+        q = self._inverse_kinematics(frames, rows, self._by_robot(self.last_q[None])[0], row, count)
+        target_q = q[np.arange(0, len(times), count)]
 
-        def near(wanted: Array) -> Array:
-            return np.stack([np.interp(wanted, times, column) for column in q.T], axis=1)
+        def near(seed_times: Array) -> Array:
+            return np.stack([np.interp(seed_times, times, column) for column in q.T], axis=1)
 
         segment = PoseSegment(
             row.name,
             t,
-            every,
+            target_q,
             positions=positions,
             quaternions=quaternions,
             frames=frames,
             near=near,
-            order=np.arange(every.shape[1]),
+            order=np.arange(target_q.shape[1]),
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)
@@ -313,40 +313,45 @@ class SegmentBuilder:
         A block of poses is solved at once; where that is not continuous, one pose after another.
         """
         joints = np.empty((len(rows), len(first)))
-        at = np.array(first)
+        current = np.array(first)
         for k in range(0, len(rows), _SAMPLES):
             block = rows[k : k + _SAMPLES]
-            q, arrived = self._solved(frames, block, at)
-            steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
+            q, arrived = self._solutions(frames, block, current)
+            steps = np.diff(np.vstack([current, q]), axis=0)[:, frames.arm]
             # The arm may be elsewhere before its first pose: of a shifted work object.
             if (
                 not arrived.all()
                 or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _LARGE_STEP
             ):
-                q = self._sequential(frames, block, at, row, (k, count))
+                q = self._sequential_solutions(frames, block, current, row, (k, count))
             joints[k : k + _SAMPLES] = q
-            at = q[-1]
+            current = q[-1]
         return joints
 
-    def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
-        seeds = np.repeat(at[None], len(poses), axis=0)
+    def _solutions(self, frames: ToolFrames, poses: Array, current: Array) -> tuple[Array, Flags]:
+        """Return the joints of poses, all from the current ones, and whether each converged."""
+        seeds = np.repeat(current[None], len(poses), axis=0)
         seeds[:, frames.external] = poses[:, 7:]
         return frames.inverse_kinematics(poses[:, :3], poses[:, 3:7], seeds)
 
-    def _sequential(
-        self, frames: ToolFrames, poses: Array, at: Array, row: Row, position: tuple[int, int]
+    def _sequential_solutions(
+        self, frames: ToolFrames, poses: Array, current: Array, row: Row, position: tuple[int, int]
     ) -> Array:
-        joints, (first, count) = np.empty((len(poses), len(at))), position
+        """Return the joints of poses, each from those of the pose before.
+
+        `position` is the index of the first pose in its row, and the poses per interval.
+        """
+        joints, (first, count) = np.empty((len(poses), len(current))), position
         for k, pose in enumerate(poses, first):
-            q, arrived = self._solved(frames, pose[None], at)
-            far = np.abs(q[0] - at)[frames.arm].max()
-            if not arrived[0] or (far > _JUMP and k):
+            q, arrived = self._solutions(frames, pose[None], current)
+            jump = np.abs(q[0] - current)[frames.arm].max()
+            if not arrived[0] or (jump > _JUMP and k):
                 line = row.poses[min(k // count + 1, len(row.poses) - 1)].line
                 raise FileFormatError(
                     f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
                     f"reach, or singular on the way"
                 )
-            joints[k - first] = at = q[0]
+            joints[k - first] = current = q[0]
         return joints
 
     def _frames_and_order(self) -> tuple[ToolFrames, list[int]]:
@@ -357,6 +362,7 @@ class SegmentBuilder:
         return self.frames, [names.index(axis.joint) for axis in self.axes]
 
     def _by_robot(self, q: Array) -> Array:
+        """Return configurations (K, n) in the robot's order of joints."""
         _, order = self._frames_and_order()
         return q[:, np.argsort(order)]
 

@@ -74,9 +74,9 @@ def shifted_move_faults(
         if isinstance(step.made, Plan) or is_shifted:
             continue
         t = np.union1d(step.motion.t, step.motion.t[:-1] + 0.5 * np.diff(step.motion.t))
-        here = step.motion(t)
+        planned_q = step.motion(t)
         for motion in motions:
-            off = np.abs(motion(np.minimum(t - t[0], motion.t[-1])) - here).max()
+            off = np.abs(motion(np.minimum(t - t[0], motion.t[-1])) - planned_q).max()
             if off > stated + JOINT_ROUNDING:
                 yield (
                     f"'{step.name}' has joints {off:.4g} rad or m off the move of the job, the "
@@ -90,12 +90,12 @@ def shifted_move_faults(
     for number, motions in parts.slow:
         ends = [job.robot.chain.place(q) for q in motions[0].q[[0, -1]]]
         first, last = (np.asarray(frame.actInv(end.translation)) for end in ends)
-        explained = min(
+        distance = min(
             np.linalg.norm(np.asarray(shift.act(first)) - last),
             np.linalg.norm(np.asarray(shift.act(last)) - first),
         )
-        if explained > _SHIFT_TOLERANCE:
+        if distance > _SHIFT_TOLERANCE:
             yield (
                 f"before '{job.steps[number].name}' it goes slowly to where neither the job is nor "
-                f"the shift of its work object takes it ({1e3 * explained:.3g} mm)"
+                f"the shift of its work object takes it ({1e3 * distance:.3g} mm)"
             )

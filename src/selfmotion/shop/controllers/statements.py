@@ -97,16 +97,16 @@ class Table:
         exact.
         """
         for statement, pattern in self._patterns:
-            found = pattern.fullmatch(text) if state in statement.states else None
-            if found:
-                return statement, found.groupdict()
+            match = pattern.fullmatch(text) if state in statement.states else None
+            if match:
+                return statement, match.groupdict()
         return None
 
     @cached_property
     def _by_values(self) -> dict[tuple[str, frozenset[str]], Statement]:
         # Of statements with the same values the first is the one that is written.
-        every = reversed(self.statements)
-        return {(item.kind, frozenset(item.values)): item for item in every}
+        statements = reversed(self.statements)
+        return {(item.kind, frozenset(item.values)): item for item in statements}
 
     @cached_property
     def _patterns(self) -> list[tuple[Statement, re.Pattern[str]]]:
@@ -125,8 +125,8 @@ class Table:
             if not self.is_exact:
                 pattern += " ?" if pattern and (is_mark or after_mark) else " " * spaced
             after_mark, spaced = is_mark, False
-            known = bool(part["name"]) and f"(?P<{part['name']}>" in pattern
-            pattern += f"(?P={part['name']})" if known else self._part(statement, part)
+            is_repeated = bool(part["name"]) and f"(?P<{part['name']}>" in pattern
+            pattern += f"(?P={part['name']})" if is_repeated else self._part(statement, part)
         return pattern
 
     def _part(self, statement: Statement, part: re.Match[str]) -> str:

@@ -91,8 +91,10 @@ class PoseSection(Section):
         t = subdivided(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
         far = _OF_POSES / np.maximum(self.frames.smallest_singular_values(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
-            at = float(t[int(far.argmax())] - motion.t[0])
-            raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
+            elapsed = float(t[int(far.argmax())] - motion.t[0])
+            raise NotByPosesError(
+                f"'{self.operation.name}': the arm is singular at t = {elapsed:.4g} s"
+            )
 
     @override
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Deviation]:
@@ -135,10 +137,11 @@ class PoseSection(Section):
             t = np.sort(np.append(t, (0.5 * (t[1:] + t[:-1]))[near]))
         raise self._singular(float(t[:-1][far][0]), allowed)
 
-    def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
-        time = at - self.operation.motion.t[0]
+    def _singular(self, time: float, allowed: Tolerance) -> NotByPosesError:
+        """Return the error that poses near a time of the motion [s] do not give its joints."""
+        elapsed = time - self.operation.motion.t[0]
         return NotByPosesError(
-            f"'{self.operation.name}': near t = {time:.4g} s the joints do not "
+            f"'{self.operation.name}': near t = {elapsed:.4g} s the joints do not "
             f"follow from poses within {1e3 * allowed.position:.3g} mm and "
             f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
         )
@@ -194,11 +197,11 @@ class PoseSection(Section):
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
             for chain in self.operation.chains:
-                _, turned, here = chain.along(line)
-                _, facing, there = chain.along(exact)
-                off = np.linalg.norm(here - there, axis=1) / allowed.position
+                _, rotations, positions = chain.along(line)
+                _, exact_rotations, exact_positions = chain.along(exact)
+                off = np.linalg.norm(positions - exact_positions, axis=1) / allowed.position
                 # |R - R'| is 2√2 sin(angle / 2).
-                angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
+                angle = np.linalg.norm(rotations - exact_rotations, axis=(1, 2)) / np.sqrt(2.0)
                 off = np.maximum(off, angle / allowed.rotation)
                 worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SAMPLING_FACTOR * worst, np.inf)
@@ -215,16 +218,16 @@ class PoseSection(Section):
         turned = (quaternions[1] - quaternions[0]) / _AROUND**2
         joints = self.frames.joint_rates(q[1], np.hstack([positions, turned]))
         others = ((q[0] - 2.0 * q[1] + q[2]) / _AROUND**2)[:, self.frames.external]
-        found: Array = np.linalg.norm(positions, axis=1) / allowed.position
+        shares: Array = np.linalg.norm(positions, axis=1) / allowed.position
         for rates in (
             np.linalg.norm(turned, axis=1, keepdims=True),
             np.abs(joints),
             np.abs(others),
         ):
             if rates.shape[1]:
-                found = np.maximum(found, rates.max(axis=1) / allowed.rotation)
+                shares = np.maximum(shares, rates.max(axis=1) / allowed.rotation)
         # Singular configurations are found where they are; they do not decide how dense all is.
-        return np.asarray(np.minimum(found, 8.0 / _SHORTEST**2))
+        return np.asarray(np.minimum(shares, 8.0 / _SHORTEST**2))
 
 
 # Joints as far off as this, of what is allowed, leave nothing to be said of the tool.
@@ -234,8 +237,8 @@ _JOINTS_FAR = 10.0
 def largest(values: Array, count: int) -> Array:
     """Return the largest of the values of each step, (count,), that at its end included."""
     steps = values[:-1].reshape(count, -1)
-    found: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))
-    return np.where(np.isnan(found), np.inf, found)
+    maxima: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))
+    return np.where(np.isnan(maxima), np.inf, maxima)
 
 
 # A motion cut into segments from rest to rest, as controllers pass it.
@@ -276,7 +279,7 @@ def segments_of(
     ProblemError
         It does not begin and end at rest, or takes more targets than any controller has.
     """
-    found: list[Segment] = []
+    segments: list[Segment] = []
     worst = Deviations(NO_DEVIATION, NO_DEVIATION)
     for k, operation in enumerate(operations):
         progress("targets", k + 1, len(operations))
@@ -298,8 +301,8 @@ def segments_of(
                     else Deviations(deviation, NO_DEVIATION)
                 )
                 worst = worst.worse(both)
-                found.append(segment)
-    return found, worst
+                segments.append(segment)
+    return segments, worst
 
 
 def _thinned(
@@ -358,8 +361,8 @@ def _rest_times(motion: Trajectory, events: Sequence[float]) -> list[float]:
     speeds = np.abs(motion.qd).max(axis=1)
     slow = min(_SLOW, _SHARE * float(speeds.max()))
     inside = np.clip(events, motion.t[0], motion.t[-1]).tolist()
-    found = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
+    rest_times = [time for time in inside if np.abs(motion(time, 1)).max() < slow]
     edges = np.diff(np.concatenate([[False], speeds < slow, [False]]).astype(int))
     for begin, end in np.flatnonzero(edges).reshape(-1, 2):
-        found.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
-    return found
+        rest_times.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
+    return rest_times

@@ -138,13 +138,13 @@ class ToolFrames:
         from scipy.spatial.transform import Rotation
 
         rotation = np.asarray(self.work.rotation)
-        wanted = positions @ rotation.T + self.work.translation
-        wanted_rotations = rotation @ Rotation.from_quat(quaternions).as_matrix()
+        required_positions = positions @ rotation.T + self.work.translation
+        required_rotations = rotation @ Rotation.from_quat(quaternions).as_matrix()
         q = np.array(near)
         for step_number in range(_MAX_ITERATIONS + 1):
             jacobian, rotations, translations = self._jacobians_and_poses(q)
-            turned = rotation_vectors(wanted_rotations @ rotations.transpose(0, 2, 1))
-            residual = np.hstack([wanted - translations, turned])
+            turned = rotation_vectors(required_rotations @ rotations.transpose(0, 2, 1))
+            residual = np.hstack([required_positions - translations, turned])
             if step_number == _MAX_ITERATIONS or np.abs(residual).max() < _CONVERGED:
                 break
             step = self._rates(jacobian, residual)
@@ -176,8 +176,8 @@ class ToolFrames:
         """Return the rotation vectors from quaternions to others (K, 4) in the work object."""
         from scipy.spatial.transform import Rotation
 
-        found: Array = (Rotation.from_quat(last) * Rotation.from_quat(first).inv()).as_rotvec()
-        return found
+        turns = Rotation.from_quat(last) * Rotation.from_quat(first).inv()
+        return np.asarray(turns.as_rotvec())
 
     def _rates(self, jacobian: Array, rates: Array) -> Array:
         """Return rates of the tool in the carrier's axes (K, 6) as rates of the arm's joints."""
@@ -201,11 +201,11 @@ class ToolFrames:
     def _jacobians_and_poses(self, q: Array) -> tuple[Array, Array, Array]:
         """Return Jacobians (K, 6, n) and poses of the program's tool in the carrier's frame."""
         jacobian, rotations, translations = self.chain.along(q)
-        other = self.flange_to_tool.inverse() * self.tool
-        lever = rotations @ np.asarray(other.translation)
+        offset = self.flange_to_tool.inverse() * self.tool
+        lever = rotations @ np.asarray(offset.translation)
         moved = jacobian.copy()
         moved[:, :3] -= skews(lever) @ jacobian[:, 3:]
-        return moved, rotations @ np.asarray(other.rotation), translations + lever
+        return moved, rotations @ np.asarray(offset.rotation), translations + lever
 
 
 def axis_inside_arm(robot: RobotModel, axes: Sequence[Axis]) -> str:

@@ -170,8 +170,8 @@ def check_joints(robot: RobotModel, joints: Sequence[str], what: str = "") -> No
 def joint_approach(q: Array, settings: ProgramSettings) -> str:
     """Return the line that goes slowly to a configuration (6,)."""
     speed, ramp = settings.approach * _FASTEST_JOINT, settings.approach * _JOINT_ACCELERATION
-    given = {"acceleration": ramp, "speed": _four_digits(speed)}
-    return f"  {URSCRIPT.text('joint approach', axes=q, **given)}"
+    limits = {"acceleration": ramp, "speed": _four_digits(speed)}
+    return f"  {URSCRIPT.text('joint approach', axes=q, **limits)}"
 
 
 def payload(settings: ProgramSettings) -> list[str]:
@@ -291,12 +291,12 @@ class UrscriptReader(ProgramReader):
         }
 
     def _approach(
-        self, target: list[float] | Pose, most: tuple[float, float], unit: str, *given: float
+        self, target: list[float] | Pose, most: tuple[float, float], unit: str, *values: float
     ) -> None:
         """Take a slow motion; nothing has judged one that is faster than those."""
-        if not all(0.0 < value <= _UP * limit for value, limit in zip(given, most, strict=True)):
+        if not all(0.0 < value <= _UP * limit for value, limit in zip(values, most, strict=True)):
             raise self.lines.fault(
-                f"a motion to where the program goes on has a={given[0]:g}, v={given[1]:g}, "
+                f"a motion to where the program goes on has a={values[0]:g}, v={values[1]:g}, "
                 f"expected at most {most[0]:g} {unit}² and {most[1]:g} {unit}: nothing has "
                 f"judged it"
             )
@@ -357,17 +357,17 @@ class UrscriptReader(ProgramReader):
 
     def _places(self) -> Array | None:
         """Return positions of the tool at the last stop and since, (K + 1, 3); None if unknown."""
-        targets = [self.here, *(target.at for target in self.run)]
-        poses = [at.position for at in targets if isinstance(at, Pose)]
-        axes = [at for at in targets if isinstance(at, list)]
-        if len(poses) == len(targets):
-            return np.array(poses)
-        stated = self.comments.axes()
-        named = [stated[axis][0] for axis in self.axes if axis in stated]
-        known = self.robot is not None and sorted(named) == sorted(self.robot.joint_names)
-        if self.robot is None or not known or len(axes) < len(targets):
+        places = self._run_places()
+        positions = [place.position for place in places if isinstance(place, Pose)]
+        axes = [place for place in places if isinstance(place, list)]
+        if len(positions) == len(places):
+            return np.array(positions)
+        stated_axes = self.comments.axes()
+        joints = [stated_axes[axis][0] for axis in self.axes if axis in stated_axes]
+        is_known = self.robot is not None and sorted(joints) == sorted(self.robot.joint_names)
+        if self.robot is None or not is_known or len(axes) < len(places):
             return None
-        order = [named.index(name) for name in self.robot.joint_names]
+        order = [joints.index(name) for name in self.robot.joint_names]
         return self.robot.chain.along(np.radians(np.array(axes)[:, order]))[2]
 
     def _refuse_stream(self, stream: str) -> None:

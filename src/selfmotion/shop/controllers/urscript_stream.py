@@ -43,17 +43,17 @@ def script(
     settings : ProgramSettings, optional
         Flange, load, outputs, and how fast to the start.
     events : sequence of (int, str)
-        Before which sample what happens. Outputs are switched as late as the arm follows.
+        Samples, and the event before each. Outputs are switched as late as the arm follows.
 
     Raises
     ------
     ProblemError
         The arm has other joints, or an event no output.
     """
-    given = ProgramSettings() if settings is None else settings
+    program_settings = ProgramSettings() if settings is None else settings
     check_joints(robot, joints)
     period = repr(1.0 / rate)
-    tool = tool_from_flange(robot, given) if len(joints) == robot.dof else None
+    tool = tool_from_flange(robot, program_settings) if len(joints) == robot.dof else None
     lines = [
         f"# {plain(robot.name)}: {len(q)} setpoints, "
         f"joints {', '.join(map(as_word, joints))} [rad].",
@@ -65,8 +65,8 @@ def script(
         "def selfmotion():",
         # One arm of a cell says none: the tool may be another's.
         *([] if tool is None else [f"  {URSCRIPT.text('set', tool=tool)}"]),
-        *payload(given),
-        joint_approach(q[0], given),
+        *payload(program_settings),
+        joint_approach(q[0], program_settings),
     ]
     late = round(_LOOK_AHEAD * rate)
     switched = {k + late: [name for at, name in events if at == k] for k, _ in events}
@@ -75,7 +75,8 @@ def script(
     for k in range(held):
         row = q[min(k, len(q) - 1)]
         lines += [
-            f"  {event_text(URSCRIPT, name, given.signal(name))}" for name in switched.get(k, ())
+            f"  {event_text(URSCRIPT, name, program_settings.signal(name))}"
+            for name in switched.get(k, ())
         ]
         lines.append(
             f"  servoj([{', '.join(map(repr, row.tolist()))}], t={period}, "
