@@ -73,9 +73,10 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
             pin.updateFramePlacement(model, data, frame)
             turns[f, k], places[f, k] = seen[f]
     own, *bases = (
-        _at_frame(model, frame, twists, place) @ coupling.matrix
-        for frame, place in zip(frames, places, strict=True)
+        _at_frame(model, frame, twists, place) for frame, place in zip(frames, places, strict=True)
     )
+    if not coupling.is_plain:
+        own, *bases = (each @ coupling.matrix for each in (own, *bases))
     if not bases:
         return own, turns[0]
     other, turned = bases[0], turns[1].transpose(0, 2, 1)
@@ -88,10 +89,13 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
 
 def _at_frame(model: pin.Model, frame: int, twists: Array, places: Array) -> Array:
     """Return the Jacobians (K, 6, m) of a frame at places (K, 3) by twists of all joints."""
-    joints = list(model.supports[model.frames[frame].parentJoint])[1:]
-    moves = np.zeros(model.nv)
-    moves[[model.idx_vs[joint] for joint in joints]] = 1.0
-    return np.asarray(np.concatenate([_shifted(twists, places), twists[:, 3:]], axis=1) * moves)
+    joints, columns = list(model.supports[model.frames[frame].parentJoint])[1:], model.idx_vs
+    still = np.ones(model.nv, dtype=bool)
+    still[[columns[joint] for joint in joints]] = False
+    found = np.concatenate([_shifted(twists, places), twists[:, 3:]], axis=1)
+    if still.any():
+        found[:, :, still] = 0.0
+    return found
 
 
 def _shifted(twists: Array, offsets: Array) -> Array:

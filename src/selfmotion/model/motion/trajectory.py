@@ -312,7 +312,8 @@ class Trajectory:
         if times is None:
             raise ValueError(f"t is {shown(t)}, expected times [s]")
         self._check_order(order)
-        if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
+        # Written so that NaN is outside too.
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"
