@@ -469,6 +469,14 @@ def test_the_axis_of_a_tilt_is_a_letter_or_numbers(tmp_path: Path) -> None:
         sm.read_problem(written(tmp_path, head + text.replace("[0, 0, 1]", '"w"')))
 
 
+def test_values_in_degrees_are_quoted_in_degrees(tmp_path: Path) -> None:
+    head = 'task = "position"\nrobot.name = "panda"\n'
+    head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n'
+    text = '[[constraints]]\nkind = "JointVelocityLimits"\nlimit_deg = { panda_joint1 = -30.0 }\n'
+    with pytest.raises(sm.errors.FileFormatError, match=r"limit_deg: is {'panda_joint1': -30.0}"):
+        sm.read_problem(written(tmp_path, head + text))
+
+
 def test_up_to_three_faults_are_told_and_the_nearest_key(tmp_path: Path) -> None:
     head = 'task = "position"\nrobot.name = "panda"\n'
     head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n'

@@ -89,14 +89,32 @@ def in_si(table: type[BaseModel], value: Any) -> Any:
             raise refused(written, item, f"'{name}' is given twice, in two units; keep one")
         info = table.model_fields.get(name)
         if unit is not None:
-            try:
-                item = scaled(item, unit)
-            except ValueError as error:
-                raise refused(written, item, str(error)) from error
+            item = _in_si(written, item, unit, checks(table.model_fields[name]))
         elif info is not None and getattr(checks(info), "within_turn", False):
             _check_radians(name, item)
         found[name] = item
     return found
+
+
+def _in_si(written: str, value: Any, unit: float, own: Checked | None) -> Any:
+    """Return the value of a key in other units in SI units; refused as it is written."""
+    try:
+        found = scaled(value, unit)
+    except ValueError as error:
+        raise refused(written, value, str(error)) from error
+    said = "" if own is None else _refusal(own, found)
+    if own is not None and said:
+        raise refused(written, value, _refusal(own, value) or said)
+    return found
+
+
+def _refusal(own: Checked, value: Any) -> str:
+    """Return why a type of ours refuses a value; "" where it does not."""
+    try:
+        own.check(value)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _check_radians(name: str, value: Any) -> None:
