@@ -23,3 +23,11 @@ def test_inverse_kinematics_names_the_miss(planar: sm.RobotModel) -> None:
     with pytest.raises(sm.errors.InverseKinematicsError, match=r"misses by 1 m") as caught:
         planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([6.0, 0, 0])), "planar", attempts=5)
     assert caught.value.position_miss == pytest.approx(1.0)
+
+
+def test_a_tool_that_points_the_other_way_round_is_turned(planar: sm.RobotModel) -> None:
+    """The error of half a turn has no direction: from there, Newton's steps would stay."""
+    seed = np.array([0.3, 2.0, 0.5])
+    target = planar.pose(seed) * pin.SE3(pin.utils.rotate("z", np.pi), np.zeros(3))
+    q = planar.inverse_kinematics(target, "planar_pose", seed=seed, attempts=1)
+    assert max(sm.Task.PLANAR_POSE.miss(target, planar.pose(q))) < 1e-10

@@ -26,7 +26,7 @@ from selfmotion.certificate.limits import (
 from selfmotion.certificate.path_error import (
     deviation_from as deviation_from,
     errors_at as errors_at,
-    errors_between as errors_between,
+    errors_of_poses as errors_of_poses,
 )
 from selfmotion.certificate.quantity import (
     Column as Column,

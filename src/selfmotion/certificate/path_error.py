@@ -20,16 +20,20 @@ from selfmotion.model.task import Relaxation, Task
 _NEAR_SINGULAR = 1e-3
 
 
-def deviation_from(
-    follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool, *, compiled: bool = False
-) -> Array:
-    """Return the deviation of the tool from the path, (K, 6).
+def deviation_from(follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool) -> Array:
+    """Return the deviation of the tool from the path at q (K, n) and times t (K,) [s], (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
-    free. The tool is where Pinocchio has it, or the `compiled` kinematics of planners.
+    free.
     """
+    return deviation_of_poses(follow, t, *poses(follow.chain, q), in_tool_axes)
+
+
+def deviation_of_poses(
+    follow: BoundTaskFrame, t: Array, rotation: Array, translation: Array, in_tool_axes: bool
+) -> Array:
+    """Return the same of poses of the tool, (K, 3, 3) and (K, 3)."""
     task = follow.task
-    rotation, translation = follow.chain.along(q)[1:] if compiled else poses(follow.chain, q)
     target = follow.path.samples(t)
     linear = task.rows[task.rows < 3]
     deviation_rows = np.zeros((len(t), 6))
@@ -262,23 +266,23 @@ def bound_errors(
     )
 
 
-def errors_between(
-    follow: BoundTaskFrame, trajectory: Trajectory, relaxations: Sequence[Relaxation]
-) -> Array:
-    """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
-    t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
-    return errors_at(follow, t, trajectory(t), relaxations)
-
-
 def errors_at(
     follow: BoundTaskFrame, t: Array, q: Array, relaxations: Sequence[Relaxation]
 ) -> Array:
-    """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad].
+    """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad]."""
+    return errors_of_poses(follow, t, *poses(follow.chain, q), relaxations)
 
-    By the compiled kinematics of planners: no proof.
-    """
+
+def errors_of_poses(
+    follow: BoundTaskFrame,
+    t: Array,
+    rotation: Array,
+    translation: Array,
+    relaxations: Sequence[Relaxation],
+) -> Array:
+    """Return the same of poses of the tool, (K, 3, 3) and (K, 3)."""
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    deviation_rows = deviation_from(follow, t, q, in_tool_axes, compiled=True)
+    deviation_rows = deviation_of_poses(follow, t, rotation, translation, in_tool_axes)
     beyond = excess(relaxations, follow.path.duration, t, deviation_rows)
     return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 

@@ -68,6 +68,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "a given start", plan(replace(alone, path=_through(circle)))
     given = sm.Problem(arm, circle, "position", home)
     free = replace(given, start=None)
+    yield "inverse kinematics", lambda: arm.inverse_kinematics(arm.pose(home), seed=home)
     yield "self-collision", plan(given)
     yield "a free start", plan(free)
     yield "the paper's arm", plan(sm.sample_problem())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,12 @@ from selfmotion.basics import (
     InverseKinematicsError,
     RobotError,
     as_whole,
+    inlined,
+    kernel,
 )
+from selfmotion.basics.layout import Layout, layout_of
+from selfmotion.model.kernels import cholesky, errors_and_rows, gram, rows_of, solve_cholesky
+from selfmotion.model.robot.placements import place_tips
 from selfmotion.model.task import Task, as_pose
 
 if TYPE_CHECKING:
@@ -23,6 +29,14 @@ if TYPE_CHECKING:
 _IK_TOLERANCE = 1e-10
 # Largest number of steps from one start.
 _IK_STEPS = 100
+# Smallest damping: steps are as good as Newton's.
+_MIN_DAMPING = 1e-14
+# Damping beyond which steps gain nothing.
+_MAX_DAMPING = 1e6
+# A tool that points the other way round misses by more than this [rad] …
+_HALF_TURN = 3.141
+# … and is turned out of it by moving all joints by this [rad or m].
+_BESIDE = 1e-3
 
 
 def inverse_kinematics(
@@ -40,7 +54,10 @@ def inverse_kinematics(
     start = 0.5 * (lower + upper) if seed is None else robot.configuration(seed)
     best = (np.inf, np.inf)
     for _ in range(attempts):
-        q, residual = _levenberg_marquardt(robot, pose, task, start)
+        q, residual = _from_start(robot, pose, task, start)
+        if residual[1] > _HALF_TURN:
+            # It says in no direction where to turn; a little beside it does.
+            q, residual = _from_start(robot, pose, task, start + _BESIDE)
         if max(residual) < _IK_TOLERANCE:
             return q
         best = min(best, residual, key=sum)
@@ -55,28 +72,67 @@ def inverse_kinematics(
     )
 
 
-def _levenberg_marquardt(
+def _from_start(
     robot: RobotModel, pose: pin.SE3, task: Task, start: Array
 ) -> tuple[Array, tuple[float, float]]:
-    q, damping = np.clip(start, robot.lower, robot.upper), 1e-3
-    actual = robot.pose(q)
-    error = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
+    """Return where the iteration from a start (n,) ends, and by how much the tool misses there."""
+    chain, lower, upper = robot.chain, np.array(robot.lower), np.array(robot.upper)
+    layout = layout_of([(task.rows, task.tool_axes, chain.joints)], robot.dof)
+    q = np.clip(start, lower, upper)
+    target = np.concatenate([pose.translation, pose.rotation.ravel()])
+    _levenberg_marquardt(q, np.array(chain.table)[None], target, layout, lower, upper)
+    return q, task.miss(pose, robot.pose(q))
+
+
+@kernel
+def _levenberg_marquardt(
+    q: Array, chains: Array, target: Array, layout: Layout, lower: Array, upper: Array
+) -> None:
+    """Move q (n,) within limits towards a tip's pose, as `Follows.targets` has it, (12,)."""
+    n, m = len(q), rows_of(layout)
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
+    rotations, positions = np.empty((1, 3, 3)), np.empty((1, 3))
+    jacobians, rows, error = np.zeros((1, 6, n)), np.empty((m, n)), np.empty(m)
+    trial, new_rows, new = np.empty(n), np.empty((m, n)), np.empty(m)
+    normal, step = np.empty((m, m)), np.empty(m)
+    place_tips(q, chains, turns, places, rotations, positions, jacobians)
+    errors_and_rows(layout, target, jacobians, rotations, positions, error, rows)
+    size, damping = _length(error), 1e-3
     for _ in range(_IK_STEPS):
-        if np.linalg.norm(error) < 0.01 * _IK_TOLERANCE:
+        if size < 0.01 * _IK_TOLERANCE or damping > _MAX_DAMPING:
             break
-        jacobian = robot.task_jacobian(q, task)
-        gradient = jacobian.T @ error
-        # Joints held at a limit that the step would leave take no part in it.
-        free = ~((q <= robot.lower) & (gradient < 0) | (q >= robot.upper) & (gradient > 0))
-        jacobian = jacobian * free
-        normal = jacobian @ jacobian.T + damping * np.eye(task.dimension)
-        trial = np.clip(q + jacobian.T @ np.linalg.solve(normal, error), robot.lower, robot.upper)
-        actual = robot.pose(trial)
-        new = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-        if np.linalg.norm(new) < np.linalg.norm(error):
-            q, error, damping = trial, new, max(0.1 * damping, 1e-14)
+        for k in range(n):
+            gradient = 0.0
+            for i in range(m):
+                gradient += rows[i, k] * error[i]
+            # Joints held at a limit that the step would leave take no part in it.
+            if (q[k] <= lower[k] and gradient < 0.0) or (q[k] >= upper[k] and gradient > 0.0):
+                rows[:, k] = 0.0
+        gram(rows, normal)
+        for i in range(m):
+            normal[i, i] += damping
+            step[i] = error[i]
+        if not cholesky(normal):
+            damping *= 10.0
+            continue
+        solve_cholesky(normal, step)
+        for k in range(n):
+            total = q[k]
+            for i in range(m):
+                total += rows[i, k] * step[i]
+            trial[k] = min(max(total, lower[k]), upper[k])
+        place_tips(trial, chains, turns, places, rotations, positions, jacobians)
+        errors_and_rows(layout, target, jacobians, rotations, positions, new, new_rows)
+        if _length(new) < size:
+            q[:], rows[:], error[:], size = trial, new_rows, new, _length(new)
+            damping = max(0.1 * damping, _MIN_DAMPING)
         else:
             damping *= 10.0
-            if damping > 1e6:
-                break
-    return q, task.miss(pose, robot.pose(q))
+
+
+@inlined
+def _length(vector: Array) -> float:
+    total = 0.0
+    for value in vector:
+        total += value * value
+    return sqrt(total)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, read_only
-from selfmotion.certificate import Certificate, Tolerance, arm_limits, errors_between
+from selfmotion.certificate import Certificate, Tolerance, arm_limits, errors_of_poses
 from selfmotion.model.follow import (
     Coordinates,
     Follows,
@@ -384,12 +384,14 @@ def certified(
 
 
 def path_errors(formulation: Formulation, trajectory: Trajectory) -> Array:
-    """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
-    own, problem = arm_motion(formulation, trajectory), formulation.problem
-    found = [
-        errors_between(item, own, () if k else problem.relaxations)
-        for k, item in enumerate(problem.follows.items)
-    ]
+    """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]: no proof."""
+    problem, t = formulation.problem, 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
+    q = arm_motion(formulation, trajectory)(t)
+    found = []
+    for k, item in enumerate(problem.follows.items):
+        _, rotation, translation = item.chain.along(q)
+        relaxations = () if k else problem.relaxations
+        found.append(errors_of_poses(item, t, rotation, translation, relaxations))
     return np.asarray(np.max(found, axis=0))
 
 
