@@ -21,6 +21,7 @@ from selfmotion.model.collision import (
     Sphere,
     link_bodies,
 )
+from selfmotion.model.collision.overlaps import links_of
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from support.independent_distances import mesh_of
 from support.two_arms import baxter_with_both_arms
@@ -415,3 +416,24 @@ def test_lever_arms_of_a_planar_arm_by_hand(tmp_path) -> None:
 def test_what_is_no_mesh_has_an_inside() -> None:
     assert Solid(coal.Box(0.1, 0.2, 0.3), "box").is_closed
     assert Solid(coal.Sphere(0.1), "ball").is_closed
+
+
+def test_robots_of_one_description_share_their_bodies() -> None:
+    """Others have their own: of other limits, locks, or files."""
+    first, again = load_robot("panda"), load_robot("panda")
+    assert links_of(first) is links_of(again)
+    locked = load_robot("panda", lock={"panda_joint3": 0.3})
+    assert links_of(locked) is not links_of(first)
+
+
+def test_a_mesh_that_changed_is_read_anew(tmp_path: Path) -> None:
+    text = """<robot name="one"><link name="base"/><link name="arm"><collision><geometry>
+    <mesh filename="{file}"/></geometry></collision></link><joint name="turn" type="revolute">
+    <parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    file, urdf = tmp_path / "box.stl", tmp_path / "one.urdf"
+    urdf.write_text(text.format(file=file))
+    for size in (0.1, 0.3):
+        trimesh.creation.box([size] * 3).export(file)
+        (body,) = links_of(load_robot(urdf)).bodies
+        assert body.solid.high == pytest.approx([size / 2.0] * 3)

@@ -1,6 +1,6 @@
 """How often pairs of bodies overlap in sampled configurations, and their closest pair."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -12,7 +12,7 @@ from selfmotion.model.collision.bodies import Body, link_bodies
 from selfmotion.model.collision.distances import HullDistances, Ints
 from selfmotion.model.collision.mesh_distances import MeshDistances
 from selfmotion.model.collision.pairs import are_neighbours, are_separate_parts, candidate_pairs
-from selfmotion.model.robot import RobotModel
+from selfmotion.model.robot import RobotModel, mesh_stamps
 
 # Number of configurations that are sampled.
 SAMPLES = 500
@@ -44,8 +44,12 @@ class Links:
     depths: dict[tuple[int, int], Array]
 
 
-# Cached: reading meshes and sampling pairs takes longer than many a plan.
+# Cached: reading meshes and sampling pairs takes longer than many a plan. Of the last robots that
+# were loaded also for others of the same description and files, which are loaded anew.
 _known: WeakKeyDictionary[RobotModel, Links] = WeakKeyDictionary()
+_alike: dict[Hashable, Links] = {}
+# Number of these robots.
+_MAX_ALIKE = 8
 
 
 def links_of(robot: RobotModel) -> Links:
@@ -57,10 +61,28 @@ def links_of(robot: RobotModel) -> Links:
         See `link_bodies`.
     """
     if robot not in _known:
-        bodies = link_bodies(robot)
-        counts = counts_of(robot, bodies, candidate_pairs(bodies, robot.urdf))
-        _known[robot] = Links(tuple(bodies), counts, depths_of(robot, bodies, counts))
+        key = _description(robot)
+        found = _alike.get(key) or _read(robot)
+        _alike[key] = _known[robot] = found
+        # The oldest one goes; another thread may have been faster.
+        for old in list(_alike)[:-_MAX_ALIKE]:
+            _alike.pop(old, None)
     return _known[robot]
+
+
+def _description(robot: RobotModel) -> Hashable:
+    """Return what the bodies of a robot and the overlaps of its pairs depend on."""
+    urdf = robot.urdf
+    held = tuple(sorted(robot.locked.items()))
+    limits = robot.lower.tobytes(), robot.upper.tobytes()
+    meshes = mesh_stamps(urdf, "collision")
+    return (urdf.text, urdf.source, urdf.package_dirs, held, limits, meshes)
+
+
+def _read(robot: RobotModel) -> Links:
+    bodies = link_bodies(robot)
+    counts = counts_of(robot, bodies, candidate_pairs(bodies, robot.urdf))
+    return Links(tuple(bodies), counts, depths_of(robot, bodies, counts))
 
 
 def counts_of(

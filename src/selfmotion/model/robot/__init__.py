@@ -32,7 +32,10 @@ from selfmotion.model.robot.dynamics import (
     Energy as Energy,
     has_masses as has_masses,
 )
-from selfmotion.model.robot.full_model import mesh_digests as mesh_digests
+from selfmotion.model.robot.full_model import (
+    mesh_digests as mesh_digests,
+    mesh_stamps as mesh_stamps,
+)
 from selfmotion.model.robot.loading import load_robot as load_robot
 from selfmotion.model.robot.mimic import mimic_of as mimic_of
 from selfmotion.model.robot.model import LIMITS as LIMITS, RobotModel as RobotModel

@@ -79,6 +79,13 @@ def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
     return {str(place): digest_of_file(place) for place in places if place is not None}
 
 
+def mesh_stamps(urdf: Urdf, tag: str) -> tuple[tuple[str, int, int], ...]:
+    """Return paths, sizes and times of change [ns] of the same files."""
+    places = (_place(urdf, file) for file in _mesh_names(urdf.text, tag))
+    stats = [(str(place), place.stat()) for place in places if place is not None]
+    return tuple((name, found.st_size, found.st_mtime_ns) for name, found in stats)
+
+
 # Cached: reading the text takes as long as a seventh of a plan.
 @lru_cache(maxsize=16)
 def _mesh_names(text: str, tag: str) -> tuple[str, ...]:
