@@ -191,8 +191,8 @@ def _compose(outer: Array, inner: Array, found: Array) -> None:
     Each product shifts by at least one, so that the first ones need few terms.
     """
     length = len(inner)
-    for left in range(len(outer) - 1, -1, -1):
-        for k in range(max(length - left, 1) - 1, -1, -1):
+    for left in range(min(len(outer), length) - 1, -1, -1):
+        for k in range(length - left - 1, -1, -1):
             for i in range(found.shape[1]):
                 total = 0.0
                 for j in range(1, k + 1):

@@ -95,8 +95,6 @@ def _polished(coefficients: Array, roots: Array) -> Array:
 def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
     """Return the roots of polynomials (m + 1, M) with leading coefficient 1, (m, M)."""
     degree, count = len(monic) - 1, monic.shape[1]
-    if degree == 1:
-        return -monic[:1] + 0.0j
     companion = np.zeros((count, degree, degree))
     companion[:, 1:, :-1] = np.eye(degree - 1)
     companion[:, :, -1] = -monic[:-1].T
@@ -176,7 +174,7 @@ class Spline:
         k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
         return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def at(self, t: Array, order: int) -> Array:
         """Return the motion or a derivative at times t (…), (…, n)."""
         return _in_chunks(lambda part: self._at(part, order), t)
 
