@@ -26,6 +26,8 @@ def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
     t, values = np.array([0.3, 0.4]), np.array([[0.9, 0.5], [0.5, 0.7]])
     for bound in (0.5, 0.4):
         assert _nearer(before, model, np.arange(2), t, values, np.full((2, 2), bound)) is before
+    # Of two that are as near, the first is told.
+    assert _nearer(before, model, np.arange(2), t, values + 0.5, np.full((2, 2), 2.0)) is before
     found = _nearer(before, model, np.arange(2), t, values, np.array([[1.0, 0.5], [0.5, 1.0]]))
     assert (found.closest.value, found.time) == (0.7, 0.4)
     assert (found.closest.first, found.closest.second) == ("c", "d")
