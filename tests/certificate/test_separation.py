@@ -138,6 +138,19 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     assert far.asked == 17
 
 
+def test_what_is_far_is_decided_by_the_first_look() -> None:
+    """However little is told of it: no more than that it is as far as was asked."""
+
+    class Told(Bodies):
+        def distances(self, q: Array, below: Array, exact_below: Array) -> Array:
+            return np.minimum(super().distances(q, below, exact_below), below)
+
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    far = Told(lambda q: np.full(len(q), 50.0))
+    assert closest_at_all_times(far, motion.trajectory, 0.1).open_until is None  # type: ignore[arg-type]
+    assert far.asked == 17
+
+
 def test_how_near_bodies_come_is_told_in_millimetres() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     text = Separation(Bodies(lambda q: np.full(len(q), 0.05)), 0.1).judge(motion).text  # type: ignore[arg-type]
