@@ -243,7 +243,11 @@ PARTS = (
     Part(
         "cam",
         ("shop/cam/*.py",),
-        ("cam", "documents/test_cases.py"),
+        (
+            "cam",
+            "documents/test_cases.py -k 'not (limit or telescope or srdf or xacro or retimed or "
+            "planar or plane or five_joints or tolerance or meshes or overlap or collision)'",
+        ),
         own_first=True,
     ),
 )
