@@ -53,6 +53,9 @@ def test_a_composition_is_that_of_polynomials() -> None:
         exact = np.polynomial.Polynomial([1.0, rate, 0.5]) ** 3
         np.testing.assert_allclose(found[: len(exact.coef), k], exact.coef, rtol=1e-13)
         assert np.all(found[len(exact.coef) :, k] == 0.0)
+    # Of fewer terms those are the same, however many there are outside.
+    for few in range(1, 6):
+        np.testing.assert_array_equal(series.composed(outer, inner[:few]), found[:few])
 
 
 def test_a_root_and_a_logarithm_are_those_of_taylor() -> None:

@@ -437,6 +437,21 @@ def test_polylines_that_are_fitted_or_meshes_are_refused(tmp_path: Path, flag: i
         rows_of(tmp_path, draw)
 
 
+@pytest.mark.parametrize("flag", [0, 1, 128])
+def test_polylines_that_are_closed_or_dashed_are_as_they_are_drawn(
+    tmp_path: Path, flag: int
+) -> None:
+    corners = [(0.0, 0.0), (10.0, 5.0), (20.0, 0.0)]
+
+    def draw(space: Any) -> None:
+        line = space.add_polyline2d(corners)
+        line.dxf.flags = line.dxf.flags | flag
+
+    (found,) = rows_of(tmp_path, draw).values()
+    expected = np.array(corners + corners[:1] * (flag == 1))
+    np.testing.assert_allclose(1e3 * found.positions[:, :2], expected, atol=1e-9)
+
+
 def test_three_ends_in_a_chain_are_not_joined_whichever_is_in_the_middle() -> None:
     """Which two of them belong together nobody knows; two that meet do."""
     chain = 0.8 * _GAP_TOLERANCE * np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])

@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.shop.cam.path_building import _CutSection, _joined_sections
 
 # Bends between uneven steps along a circle, each below 30° [°], and its radius [m].
 ANGLES, RADIUS = np.cumsum([0.0, 24.0, 6.0, 27.0, 12.0, 25.0, 3.0, 20.0]), 0.5
@@ -56,3 +57,27 @@ def test_a_path_takes_its_length_over_its_feed_or_its_duration(
         speeds = np.linalg.norm(timed.samples(t).twist[:, :3], axis=1)
         # As fast as it goes on the whole.
         np.testing.assert_allclose(speeds, arc / 7.0, rtol=0.2)
+
+
+def test_what_is_at_a_feed_is_one_section_and_turns_beside_rapid_legs_are_none_of_it() -> None:
+    """Of four legs with turns between them, whichever is rapid."""
+
+    def section(first: float, last: float) -> _CutSection:
+        ends = np.array([[first, 0.0, 0.0], [last, 0.0, 0.0]])
+        return _CutSection(ends, np.tile(np.eye(3), (2, 1, 1)), np.ones(2), first == last)
+
+    legs = [section(k, k + 1.0) for k in range(4)]
+    turns = [section(k, k) for k in range(1, 4)]
+    sections = [legs[0], turns[0], legs[1], turns[1], legs[2], turns[2], legs[3]]
+    for rapid, expected in (
+        ([False] * 4, [(0, 4, False)]),
+        ([True, False, False, False], [(0, 1, True), (1, 1, True), (1, 4, False)]),
+        (
+            [False, False, True, False],
+            [(0, 2, False), (2, 2, True), (2, 3, True), (3, 3, True), (3, 4, False)],
+        ),
+    ):
+        found = _joined_sections(sections, rapid)
+        told = [(x.positions[0, 0], x.positions[-1, 0], x.is_free) for x in found]
+        assert told == expected
+        assert all(len(x.positions) == len(x.rotations) == len(x.feeds) for x in found)

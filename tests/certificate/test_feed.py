@@ -62,6 +62,7 @@ def test_a_feed_that_is_kept_is_told(feed: float, tmp_path: FilePath) -> None:
     assert certificate.verified, certificate.verdict
     assert "feed" in certificate.covers
     assert f"the feed of {feed:g} m/s is reached" in certificate.findings[-1].text
+    assert certificate.findings[-1].allowed == pytest.approx((1.0 - found.within) * feed)
     # Where it counts, and that is nearly everywhere, by the path's own twist.
     t = np.linspace(0.0, path.duration, 20_001)
     speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)

@@ -26,6 +26,8 @@ def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
     t, values = np.array([0.3, 0.4]), np.array([[0.9, 0.5], [0.5, 0.7]])
     for bound in (0.5, 0.4):
         assert _nearer(before, model, np.arange(2), t, values, np.full((2, 2), bound)) is before
+    # Of two that are as near, the first is told.
+    assert _nearer(before, model, np.arange(2), t, values + 0.5, np.full((2, 2), 2.0)) is before
     found = _nearer(before, model, np.arange(2), t, values, np.array([[1.0, 0.5], [0.5, 1.0]]))
     assert (found.closest.value, found.time) == (0.7, 0.4)
     assert (found.closest.first, found.closest.second) == ("c", "d")
@@ -132,6 +134,19 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     # Sixteen intervals, halved 40 times.
     assert (found.open_until - found.time) * 16.0 * 2.0**40 == pytest.approx(1.0, rel=1e-2)
     far = Bodies(lambda q: np.full(len(q), 50.0))
+    assert closest_at_all_times(far, motion.trajectory, 0.1).open_until is None  # type: ignore[arg-type]
+    assert far.asked == 17
+
+
+def test_what_is_far_is_decided_by_the_first_look() -> None:
+    """However little is told of it: no more than that it is as far as was asked."""
+
+    class Told(Bodies):
+        def distances(self, q: Array, below: Array, exact_below: Array) -> Array:
+            return np.minimum(super().distances(q, below, exact_below), below)
+
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    far = Told(lambda q: np.full(len(q), 50.0))
     assert closest_at_all_times(far, motion.trajectory, 0.1).open_until is None  # type: ignore[arg-type]
     assert far.asked == 17
 

@@ -30,6 +30,16 @@ def test_what_is_relaxed_is_said_where_something_is() -> None:
     assert [item.name for item in relaxed.deviations] == ["(x)"]
 
 
+def test_what_is_allowed_is_said_where_it_is_more_than_usual() -> None:
+    assert "allowed" not in still().verdict
+    usual = still().tolerance
+    for name in ("position", "rotation"):
+        size = getattr(usual, name)
+        larger, smaller = (replace(usual, **{name: by * size}) for by in (2.0, 0.5))
+        assert "are allowed" in replace(still(), tolerance=larger).verdict
+        assert "allowed" not in replace(still(), tolerance=smaller).verdict
+
+
 def test_what_was_not_checked_is_said_unless_all_was() -> None:
     one = still()
     assert one.not_checked == ("accelerations", "self-collision")

@@ -287,6 +287,16 @@ def test_a_surface_that_is_turned_inside_out_in_part_is_not_closed() -> None:
     assert not mirrored.contains_any(np.zeros((1, 3)))
 
 
+def test_triangles_of_hulls_point_outwards() -> None:
+    """The volume that they enclose, with its sign: coal's depths of overlap rest on that."""
+    points = np.random.default_rng(0).normal(size=(40, 3))
+    hull = trimesh.convex.convex_hull(points)
+    # Whichever way the mesh's own triangles turn.
+    for faces in (hull.faces, hull.faces[:, ::-1]):
+        solid = Solid(mesh_of(hull.vertices, faces), "hull")
+        assert solid.hull.computeVolume() == pytest.approx(hull.volume, rel=1e-9)
+
+
 # Lever arms: no point moves farther, no distance changes more, than they say; on every arm.
 
 WORLD = (Box("box", [0.6, 0.3, 0.5], [0.2, 0.3, 0.4]), Sphere("ball", [-0.4, 0.5, 0.9], 0.1))

@@ -13,6 +13,7 @@ from selfmotion.model.collision import (
     Box,
     Capsule,
     ClearanceModel,
+    Clearances,
     CollisionModel,
     Cylinder,
     Mesh,
@@ -282,3 +283,13 @@ def test_pairs_of_convex_bodies_alone_are_exact(tmp_path: Path) -> None:
     # Of the arm's own meshes some are convex, others are not.
     assert True in convex
     assert not any(kept for pair, kept in exact.items() if "walls" in pair)
+
+
+@pytest.mark.parametrize("count", [0, 9])
+def test_slopes_of_some_pairs_are_those_of_all(count: int) -> None:
+    rng, shape = np.random.default_rng(0), (5, 4)
+    rows, columns = np.unravel_index(np.sort(rng.permutation(20)[:count]), shape)
+    found = Clearances(np.ones(shape), rows, columns, rng.normal(size=(count, 3)))
+    every, (samples, pairs) = found.jacobian(), np.indices(shape).reshape(2, -1)
+    np.testing.assert_array_equal(found.slopes_at(samples, pairs), every[samples, pairs])
+    assert np.count_nonzero(every.any(axis=2)) == count

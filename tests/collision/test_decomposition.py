@@ -136,6 +136,22 @@ def test_the_same_mesh_has_the_same_pieces(solid) -> None:
     assert all(np.array_equal(a, b) for a, b in zip(again, pieces, strict=True))
 
 
+def test_the_order_of_pieces_is_that_of_the_parts_of_the_mesh() -> None:
+    """Whichever of them is nearest to convex: a dent of a millimetre or two is none to cut."""
+
+    def dented(corner: float, size: float) -> trimesh.Trimesh:
+        notch = bar((corner + 0.05, 0.05, 0.1 - size), (size, size, size + 0.1))
+        bars = [bar((corner, 0.0, 0.0), (0.1, 0.1, 0.1)), notch]
+        return trimesh.boolean.difference(bars, engine="manifold")
+
+    for sizes in ((1e-3, 2e-3), (2e-3, 1e-3)):
+        two = trimesh.util.concatenate(
+            [dented(x, size) for x, size in zip((0, 1), sizes, strict=True)]
+        )
+        pieces = convex_pieces(np.asarray(two.vertices), np.asarray(two.faces))
+        assert [round(float(piece[:, 0].min()), 9) for piece in pieces] == [0.0, 1.0]
+
+
 def read(mesh: trimesh.Trimesh, file: Path) -> Solid:
     mesh.export(file)
     return Solid(Mesh("part", [0.0] * 3, file).geometry(), "part")

@@ -56,6 +56,13 @@ def test_position_alone_is_a_pose_along_the_world_axes() -> None:
     assert same.to_dict() == box.to_dict()
 
 
+def test_a_length_is_at_most_a_thousand_kilometres() -> None:
+    """More is a wrong unit, and beyond what distances resolve."""
+    assert Sphere("large", POSE, 1e6).radius == 1e6
+    with pytest.raises(CollisionError, match="radius"):
+        Sphere("larger", POSE, 1.001e6)
+
+
 def test_values_are_copies_that_cannot_be_written() -> None:
     pose, size = pin.SE3(POSE), np.ones(3)
     box = Box("box", pose, size)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmotion.model.motion import Trajectory, evaluated
-from selfmotion.model.motion.spline import inner_roots, may_vanish
+from selfmotion.model.motion.spline import differentiated, inner_roots, may_pass, may_vanish
 
 
 def test_roots_of_polynomials_of_all_degrees() -> None:
@@ -18,6 +18,15 @@ def test_roots_of_polynomials_of_all_degrees() -> None:
             np.sort(found[:degree], axis=0), np.sort(roots, axis=0), atol=1e-5
         )
         assert not found[degree:].any()
+
+
+def test_what_is_differentiated_to_the_end_is_a_constant_of_zero() -> None:
+    found = np.random.default_rng(0).normal(size=(4, 2, 3))
+    for order in range(1, 6):
+        expected = np.polynomial.polynomial.polyder(found)
+        found = differentiated(found)
+        assert len(found) == max(4 - order, 1)
+        np.testing.assert_allclose(found, expected, rtol=1e-15)
 
 
 def test_small_leading_coefficients_cost_no_digits() -> None:
@@ -41,6 +50,21 @@ def test_polynomials_that_may_vanish_are_all_found() -> None:
         # Far from zero nothing is looked for.
         coefficients[0] += 100.0
         assert not may_vanish(coefficients).any()
+
+
+def test_polynomials_that_leave_limits_between_their_ends_are_all_found() -> None:
+    rng = np.random.default_rng(1)
+    s, limits = np.linspace(0.0, 1.0, 501), np.array([1.0, 2.0])
+    for degree in range(1, 6):
+        coefficients = rng.normal(size=(degree + 1, 300, 2))
+        values = np.stack([evaluated(coefficients, at) for at in s])
+        inside = np.all(np.abs(values[[0, -1]]) <= limits, axis=0)
+        below, above = (values < -limits).any(axis=0), (values > limits).any(axis=0)
+        assert may_pass(coefficients, -limits, limits)[inside & (below | above)].all()
+        # One side is asked for as well as the other, and far from both nothing is.
+        assert may_pass(coefficients, -limits, np.full(2, 1e3))[inside & below].all()
+        assert may_pass(coefficients, np.full(2, -1e3), limits)[inside & above].all()
+        assert not may_pass(coefficients, np.full(2, -1e3), np.full(2, 1e3)).any()
 
 
 @pytest.mark.parametrize("away", [1e-9, 5e-4, 0.3])

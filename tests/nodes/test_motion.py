@@ -7,12 +7,12 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation, path_errors
-from selfmotion.planning.nodes import NodeGrid, broken_intervals, forget
+from selfmotion.planning.nodes import NodeGrid, breaks_hard, broken_intervals, forget
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import hermite_accelerations, moved_along, stepped
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
-from support.nodes import nodes_of, problem_of
+from support.nodes import around_of, nodes_of, problem_of
 from support.stretching import DURATION, rounded_problem, stretching
 
 # The arm moves at a steady speed [rad/s²].
@@ -171,3 +171,44 @@ def test_an_arm_that_rests_accelerates_where_its_path_does(panda: sm.RobotModel)
         np.testing.assert_allclose(motion.place.qd[node], 0.0, atol=1e-12)
         tool = panda.jacobian(motion.place.q[node]) @ motion.place.qdd[node]
         np.testing.assert_allclose(np.abs(tool), seconds * along, atol=1e-6)
+    # So it is where rates are given anew.
+    again = motion.grid.around(motion.charts, motion.place.qd + 1.0, motion.place.qdd)
+    assert again is not None
+    np.testing.assert_allclose(again.place.qd[[0, -1]], 0.0, atol=1e-12)
+
+
+def test_joints_that_stand_still_for_a_while_have_no_coordinates_then(panda: sm.RobotModel) -> None:
+    """What is not held moves none of them, and of each order one is held for each."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    window = sm.Relaxation("rz", 0.1, during=(1.0, 3.0))
+    motion = nodes_of(
+        problem_of((panda, "pose", PANDA_HOME, path), relaxations=[window]), free=True
+    )
+    grid, still = motion.grid, motion.grid.manifolds.held
+    assert 0 < still.sum() < len(still)
+    held = np.zeros((len(still), 3 * motion.nu.shape[1]), dtype=bool)
+    held.reshape(-1)[grid.held] = True
+    np.testing.assert_array_equal(held.sum(axis=1), 3 * still.sum(axis=1))
+    changes = around_of(motion).changes
+    for node, joint in np.argwhere(still).tolist():
+        assert not changes[node, :, joint][:, ~held[node]].any()
+    np.testing.assert_array_equal(grid.rested(np.ones(still.shape), 1), ~still)
+
+
+def test_a_step_of_each_coordinate_counts_as_much_as_the_others(panda: sm.RobotModel) -> None:
+    """In a usual interval a rate changes an angle as much as the coordinate that stands for it."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    motion = nodes_of(problem_of((panda, "pose", PANDA_HOME, path)), 10)
+    np.testing.assert_allclose(motion.grid.scale * 0.4 ** np.arange(3.0), 1.0, rtol=1e-12)
+
+
+def test_limits_are_broken_by_what_lies_beyond_them(panda: sm.RobotModel) -> None:
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    case = panda, "pose", PANDA_HOME, path
+    wide, tight = (
+        nodes_of(problem_of(case, constraints=(sm.constraints.JointVelocityLimits(most),)))
+        for most in (10.0, 0.01)
+    )
+    assert not breaks_hard(wide)
+    assert breaks_hard(tight)
+    assert not breaks_hard(tight, tight.violation)

@@ -1,5 +1,7 @@
 """A map over two coordinates of a place, on costs by a formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -61,3 +63,16 @@ def test_a_map_has_its_costs_written_in_it_unless_more_points_are_asked_for() ->
     written = [drawn.svg().count(f">{drawn.costs[0, 0]:.3g}</text>") for drawn in (few, many)]
     assert written[0] > 0
     assert written[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("before", "said"),
+    [
+        (4.0, "cost 1 (4 at the present place, 75.0% less)"),
+        (0.0, "cost 1 (0 at the present place, 0.0% less)"),
+        (np.inf, "cost 1 (no verified motion at the present place)"),
+        (np.nan, "cost 1 (the present place is not in the box)"),
+    ],
+)
+def test_what_another_place_saves_is_said(before: float, said: str) -> None:
+    assert said in str(replace(placement(), cost_before=before))

@@ -88,6 +88,19 @@ def test_between_two_frames_only_the_joints_between_count(
     same(chain.relative_spin(seen), spin)
 
 
+def test_between_two_links_each_turn_is_turned_by_those_before_it(panda: sm.RobotModel) -> None:
+    q = random_joints(panda)
+    chain = ChainSeries(panda, q, HALF)
+    seen = panda.chain_to("panda_link7", "panda_link4")
+    before = [series.exponential(q[4:k].sum(axis=0)) for k in range(4, 8)]
+    spin = sum(
+        series.product(series.derivative(q[k], HALF), by)
+        for k, by in zip(range(4, 7), before, strict=False)
+    )
+    same(chain.relative_spin(seen), spin)
+    same(chain.relative(seen)[1], before[-1])
+
+
 # The tool's rates are derivatives of its pose.
 
 

@@ -8,6 +8,7 @@ from selfmotion.model.follow import Coordinates, Follows
 from selfmotion.model.kernels import carried
 from selfmotion.model.robot import null_space
 from selfmotion.planning.search import Manifold, spread
+from selfmotion.planning.search.manifold import approach_all
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of
@@ -101,3 +102,22 @@ def test_each_of_many_targets_is_given_the_steps_that_it_needs() -> None:
     targets = np.hstack([places, np.tile(np.eye(3).ravel(), (3, 1))])
     begun = np.tile([0.05, -0.03, 0.02], (3, 1))
     assert manifold.project(begun, targets)[1].all()
+
+
+@pytest.mark.parametrize("away", [1.1, 2.0])
+def test_what_hardly_comes_nearer_to_its_target_goes_no_further(away: float) -> None:
+    """An arm that stretches towards a point beyond its reach, slower with each step."""
+    robot = robot_named("planar_3r")
+    free = np.full(robot.dof, np.inf)
+    manifold = Manifold(standing(robot, sm.Task.PLANAR), -free, free)
+    farthest = robot.pose(np.zeros(robot.dof)).translation
+    target = np.concatenate([away * farthest, np.eye(3).ravel()])
+    found = []
+    for iterations in (60, 300):
+        q, left = np.array([[0.5, -0.3, 0.2]]), np.zeros((1, 2))
+        tables = manifold.chains, manifold.layout, *manifold._limits, np.zeros(3, dtype=bool)
+        approach_all(q, target, *tables, iterations, left)
+        found.append(q)
+        nearest = (away - 1.0) * np.linalg.norm(farthest)
+        assert nearest <= np.linalg.norm(left) < 1.001 * nearest
+    np.testing.assert_array_equal(*found)

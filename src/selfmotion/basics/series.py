@@ -191,11 +191,11 @@ def _compose(outer: Array, inner: Array, found: Array) -> None:
     Each product shifts by at least one, so that the first ones need few terms. Many outer series
     are polynomials of a low degree, with zeros above.
     """
-    length, last = len(inner), len(outer) - 1
+    length, last = len(inner), min(len(outer), len(inner)) - 1
     while last > 0 and not outer[last].any():
         last -= 1
     for left in range(last, -1, -1):
-        for k in range(max(length - left, 1) - 1, -1, -1):
+        for k in range(length - left - 1, -1, -1):
             # One row after the other: neighbours in memory are neighbouring intervals.
             found[k] = 0.0
             for j in range(1, k + 1):

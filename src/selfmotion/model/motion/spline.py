@@ -95,8 +95,6 @@ def _polished(coefficients: Array, roots: Array) -> Array:
 def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
     """Return the roots of polynomials (m + 1, M) with leading coefficient 1, (m, M)."""
     degree, count = len(monic) - 1, monic.shape[1]
-    if degree == 1:
-        return -monic[:1] + 0.0j
     if degree == 2:
         middle = -0.5 * monic[1]
         apart = np.sqrt(middle**2 - monic[0] + 0.0j)
@@ -180,7 +178,7 @@ class Spline:
         k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
         return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def at(self, t: Array, order: int) -> Array:
         """Return the motion or a derivative at times t (…), (…, n)."""
         return _in_chunks(lambda part: self._at(part, order), t)
 
