@@ -112,8 +112,11 @@ class DividesAtNodes:
     def _without_more(self, known: NodeOutcome, found: NodeOutcome, polishes: bool) -> NodeOutcome:
         """Return the last optimum where more nodes lead nowhere.
 
-        Multipliers on the way say nothing.
+        Multipliers on the way say nothing. Where the optimum breaks something between its nodes,
+        and what is on the way keeps it, that will do.
         """
+        if not polishes and is_kept(found.motion) and _mends(found.motion, known.motion):
+            return found
         again = None if polishes else self._search.again(known)
         if again is not None and again.has_arrived:
             return again
@@ -121,6 +124,11 @@ class DividesAtNodes:
         errors = path_errors(self._search.formulation, known.motion.trajectory)
         off = not polishes and again is None and errors.max() > _NEAR_PATH
         return found if off else known
+
+
+def _mends(fine: NodeMotion, coarse: NodeMotion) -> bool:
+    """Whether a motion on more nodes keeps between them what one on fewer breaks there."""
+    return bool(broken_intervals(coarse).any() and not broken_intervals(fine).any())
 
 
 def _farther_apart(search: LocalSearch, known: NodeOutcome) -> NodeOutcome | None:
