@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, series
-from selfmotion.certificate import BoundedFunction, MotionSegments
+from selfmotion.certificate import BoundedFunction, MotionSegments, bounding
 from selfmotion.certificate.bounding import bounded
 from support.arms import robot_named
 from support.motions import motion_of
@@ -111,3 +111,22 @@ def test_a_stretch_is_the_trajectory(degree: int) -> None:
             most = known[order] * [1.0, 1.0, 2.0, 6.0][order] / segments.half**order
             largest = np.abs(segments.motion(u, order)[:, joint]).reshape(-1, len(u)).max(axis=1)
             assert np.all(largest <= most * (1.0 + ROUNDING) + ROUNDING)
+
+
+def test_few_intervals_take_the_nodes_of_others() -> None:
+    """The next larger number that some take; those of no bound, and the largest, stay."""
+    few, many = 3, bounding._FEW
+    which = np.repeat([0, 1, 3, 4], [few, many, few, few])
+    enough = np.ones(len(which), dtype=bool)
+    expected = np.repeat([1, 1, 4, 4], [few, many, few, few])
+    np.testing.assert_array_equal(bounding._with_others(which, enough), expected)
+    enough[:few] = False
+    expected[:few] = 0
+    np.testing.assert_array_equal(bounding._with_others(which, enough), expected)
+    # Each joins the next one, which is then larger.
+    chained = np.repeat([0, 1, 2], [few, few, many])
+    found = bounding._with_others(chained, np.ones(len(chained), dtype=bool))
+    np.testing.assert_array_equal(found, 2)
+    joined = np.repeat([0, 1, 2], [few, many - few, many])
+    found = bounding._with_others(joined, np.ones(len(joined), dtype=bool))
+    np.testing.assert_array_equal(found, np.repeat([1, 2], many))
