@@ -29,6 +29,7 @@ def test_gradient_projection_climbs(panda_circle: Circle) -> None:
     assert moving.certificate.verified
 
 
+@pytest.mark.site
 def test_gradient_projection_tunes_its_gain() -> None:
     """The tuned gain is no worse than others, and better than none."""
     problem = sm.sample_problem()

@@ -193,6 +193,7 @@ with event.install_listener("numba:compile", counted):
 """
 
 
+@pytest.mark.site
 def test_a_change_of_what_a_kernel_calls_in_another_file_compiles_it_anew(tmp_path: Path) -> None:
     """Also of a number that it takes from there, and nothing else does."""
     folder = tmp_path / "kernels_of_a_test"

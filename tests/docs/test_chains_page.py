@@ -63,6 +63,7 @@ def repository(folder: Path, name: str, text: str) -> Path:
     return given
 
 
+@pytest.mark.site
 def test_a_makers_repository_is_fetched_and_planned_by_two_commands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -241,6 +241,7 @@ def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
         sm.margin(other)
 
 
+@pytest.mark.site
 def test_of_a_program_margins_are_those_of_its_seams(plan: sm.Plan, tmp_path: Path) -> None:
     (tmp_path / "a.program").touch()
     with pytest.raises(sm.errors.FileFormatError, match="holds several plans, expected one"):

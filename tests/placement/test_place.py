@@ -191,6 +191,7 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
     np.testing.assert_allclose(shift, [0.1, 0.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.site
 def test_several_seams_are_placed_together_and_elsewhere_alike(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
