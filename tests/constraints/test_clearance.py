@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import read_archive, write_archive
 from selfmotion.planning.result.archive import file_digest
-from selfmotion.problem.constraints import NO_OVERLAP
+from selfmotion.problem.constraints import NO_OVERLAP, with_own_distances
 from selfmotion.problem.problem.digest import conditions_digest
 from support.arms import PANDA_HOME, short_line
 
@@ -160,3 +161,51 @@ def test_several_clearances_are_written_and_read(
         match=r"clearance\[0\]\.obstacles\[0\]\.radios.*clearance\[0\]\.obstacles\[0\]\.radius: is",
     ):
         sm.read_problem(file)
+
+
+def test_only_pairs_of_the_named_obstacles_are_kept_apart(panda: sm.RobotModel) -> None:
+    """More than its own links can be from each other, and no other pair is measured."""
+    beside = panda.pose(PANDA_HOME).translation + np.array([0.0, 0.25, 0.0])
+    boxes = [
+        sm.obstacles.Box("clamp", beside, [0.05, 0.05, 0.2]),
+        sm.obstacles.Box("roof", [0.3, 0.0, 1.6], [1.0, 1.0, 0.02]),
+        sm.obstacles.Box("torch", [0.0, 0.0, 0.05], [0.02, 0.02, 0.1], frame="panda_hand"),
+    ]
+    every = sm.constraints.Clearance(boxes, 0.05)
+    clearance = sm.constraints.Clearance(boxes, 0.05, only=("clamp",))
+    pairs = clearance.model(panda).pairs
+    assert pairs == tuple(pair for pair in every.model(panda).pairs if "clamp" in pair)
+    assert any("torch" in pair for pair in pairs)
+    assert every.keeps_as_far(clearance)
+    assert not clearance.keeps_as_far(every)
+    described = clearance.to_dict()
+    del described["kind"]
+    assert sm.constraints.Clearance.from_dict(described).only == ("clamp",)
+    path = short_line(panda, PANDA_HOME)
+    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, clearance=clearance))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.approaches["clamp"].value >= 0.05
+    with pytest.raises(sm.errors.ProblemError, match="only has 'door', which is none of its obst"):
+        sm.constraints.Clearance(boxes, only=("door",))
+    with pytest.raises(sm.errors.ProblemError, match="expected names of obstacles"):
+        sm.constraints.Clearance(boxes, only="clamp")  # type: ignore[arg-type]
+
+
+def test_obstacles_with_a_distance_of_their_own_have_a_clearance_of_their_own() -> None:
+    """Each pair of bodies that may meet is in one of them, at the distance of its obstacle."""
+    boxes = [
+        sm.obstacles.Box("clamp", [0.5, 0.2, 0.2], [0.1, 0.1, 0.1]),
+        sm.obstacles.Box("post", [0.5, -0.4, 0.2], [0.1, 0.1, 0.1]),
+        sm.obstacles.Box("torch", [0.0, 0.0, 0.1], [0.1, 0.1, 0.1], frame="panda_hand"),
+    ]
+    disabled = (("clamp", "torch"), ("post", "panda_link1"), ("panda_link5", "panda_link7"))
+    given = sm.constraints.Clearance(boxes, 0.005, disabled=disabled)
+    rest, apart = with_own_distances(given, {"clamp": 0.02})
+    assert [item.name for item in rest.obstacles] == ["post", "torch"]
+    assert (rest.distance, rest.disabled, rest.only) == (0.005, disabled[1:], ())
+    # What stands does not come near to what stands.
+    assert [item.name for item in apart.obstacles] == ["clamp", "torch"]
+    assert (apart.distance, apart.disabled, apart.only) == (0.02, disabled[:1], ("clamp",))
+    assert with_own_distances(given, {"door": 0.02}) == (given,)
+    with pytest.raises(sm.errors.ProblemError, match="is only of post, and obstacle 'clamp' has a"):
+        with_own_distances(replace(given, only=("post",)), {"clamp": 0.02})

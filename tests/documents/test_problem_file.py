@@ -543,3 +543,46 @@ def test_a_key_of_a_table_is_told_where_it_belongs(tmp_path: Path) -> None:
         with pytest.raises(sm.errors.FileFormatError) as refused:
             sm.read_problem(file)
         assert f"{key}: unknown key; it belongs to {tables}" in str(refused.value)
+
+
+def test_a_body_has_a_distance_of_its_own(tmp_path: Path) -> None:
+    """What is written of it is read again."""
+    file = tmp_path / "own.toml"
+    file.write_text(
+        """
+task = "position"
+start = "free"
+[robot]
+name = "panda"
+[workpiece]
+frame = { position = [0.5, 0.0, 0.2] }
+[[workpiece.obstacles]]
+shape = "box"
+name = "clamp"
+position_mm = [0, 200, 0]
+size_mm = [40, 40, 40]
+distance_mm = 20
+[path]
+kind = "circle"
+radius = 0.1
+duration = 4.0
+start = { position = [0, 0, 0.1], rpy_deg = [180, 0, 0] }
+[clearance]
+distance_mm = 5
+[[clearance.obstacles]]
+shape = "box"
+name = "post"
+position = [0.3, -0.6, 0.6]
+size = [0.1, 0.1, 1.2]
+"""
+    )
+
+    def distances(file: Path) -> list[tuple[float, list[str], tuple[str, ...]]]:
+        found = sm.read_problem(file).clearances
+        return [(one.distance, [body.name for body in one.obstacles], one.only) for one in found]
+
+    expected = [(0.005, ["post"], ()), (0.02, ["clamp"], ("clamp",))]
+    assert distances(file) == expected
+    again = tmp_path / "again.toml"
+    sm.files.write_problem(sm.read_problem(file), again)
+    assert distances(again) == expected

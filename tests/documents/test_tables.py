@@ -57,7 +57,10 @@ BESIDES: Mapping[str, tuple[set[str], set[str]]] = {
     "twist": ({"breaks", "coefficients"}, {"velocity", "duration"}),
     **dict.fromkeys(("feed", "joined", "weave"), (FRAMED, set())),
     **dict.fromkeys(("polyline", "waypoints"), ({"quaternions"} | FRAMED, set())),
-    **dict.fromkeys(("box", "sphere", "cylinder", "capsule", "mesh"), (POSE, {"pose"})),
+    # The distance from a body is its clearance's.
+    **dict.fromkeys(
+        ("box", "sphere", "cylinder", "capsule", "mesh"), ({*POSE, "distance"}, {"pose"})
+    ),
 }
 # Defaults that files have otherwise, and why.
 DEFAULTS = {

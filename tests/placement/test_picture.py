@@ -125,6 +125,18 @@ def test_contours_are_where_costs_are_that_much_above_the_least() -> None:
             assert np.hypot(*np.subtract(*ends)) <= cell
 
 
+def test_numbers_of_contours_are_over_no_cost() -> None:
+    root = drawn()
+    costs = [text for cell in root.iterfind("g") for text in cell.iterfind("text")]
+    told = [part for part in root.iterfind("text") if (part.text or "").startswith("+")]
+    for one in told:
+        for other in costs:
+            (x, y, size), (i, j, _) = (
+                numbers(part, "x", "y", "font-size") for part in (one, other)
+            )
+            assert abs(y - j) > size or abs(x - i) > 3 * size
+
+
 def test_colours_go_from_the_cheapest_to_the_dearest() -> None:
     fills = [part.get("fill", "") for part in drawn().iterfind("g/rect")]
     mixed = np.array([list(map(int, re.findall(r"\d+", fill))) for fill in fills])

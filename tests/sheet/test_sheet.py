@@ -87,6 +87,13 @@ def test_numbers_are_those_of_certificate_report_and_margins(plan: sm.Plan, tmp_
     assert "the arm is built as its URDF draws it" in page
 
 
+def test_times_stay_with_their_units(plan: sm.Plan, tmp_path: Path) -> None:
+    text = sm.files.write_sheet(plan, tmp_path / "sheet.html").read_text()
+    times = re.findall(r"<td([^>]*)>[\d.]+ s</td>", text)
+    assert times
+    assert set(times) == {' class="whole"'}
+
+
 def test_what_is_not_kept_is_said(plan: sm.Plan, tmp_path: Path) -> None:
     broken = dataclasses.replace(plan, certificate=plan.check(sm.Tolerance(1e-15, 1e-15)))
     page = sm.files.write_sheet(broken, tmp_path / "sheet.html").read_text()

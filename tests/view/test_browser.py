@@ -25,7 +25,8 @@ TIMES = 3
 TEXTS = ("h1", "#verdict", "#told", "#change h2", "#figures dd", "#sliders span")
 BOXES = (
     "#said", "#legend", "#layers", "#play", "#time", "#undo", "#save", "#export", "#handles button",
-    "#turns", "#letgo", "#sliders input", "#figures", "#jog", "#measure",
+    "#turns", "#letgo", "#place input", "#why", "#green", "#sliders input", "#figures", "#jog",
+    "#measure",
 )  # fmt: skip
 
 
@@ -169,20 +170,74 @@ def test_the_map_beside_the_scene_says_why_and_its_slice_stays(page: Any, server
     assert choice.input_value() == labels[1]
 
 
-def test_places_in_reach_are_green_while_the_path_is_held(page: Any, server: Served) -> None:
-    held = """(held) => {
-      const { handles } = replay.live;
-      handles.choose("path");
-      handles.grip(held);
-      if (held) { handles.shown.get("path").mark.position.y += 0.001; handles.dragged(); }
-    }"""
-    page.evaluate(held, True)
+def test_places_in_reach_are_green_as_long_as_the_path_is_chosen(page: Any, server: Served) -> None:
+    """Also before it is dragged, and when it is released."""
+    floor = "viewer.nodes.has('/selfmotion/floor')"
+    page.evaluate("replay.live.handles.choose('path')")
     page.locator("#green").wait_for(timeout=PATIENCE)
-    assert page.evaluate("viewer.nodes.has('/selfmotion/floor')")
-    page.evaluate(held, False)
+    drag(page, "path", 1.0)
     settled(page, server)
+    page.locator("#green").wait_for(timeout=PATIENCE)
+    assert page.evaluate(floor)
+    page.locator("#letgo").click()
     page.locator("#green").wait_for(state="hidden", timeout=PATIENCE)
-    assert not page.evaluate("viewer.nodes.has('/selfmotion/floor')")
+    assert not page.evaluate(floor)
+    page.locator("#undo").click()
+    settled(page, server)
+
+
+def test_a_place_is_typed(page: Any, server: Served) -> None:
+    page.locator("[data-handle=post]").click()
+    across = page.locator("[data-axis='1']")
+    assert float(across.input_value()) == pytest.approx(
+        1e3 * server.session.edited.document["clearance"]["obstacles"][0]["position"][1], abs=0.05
+    )
+    across.fill("-612.5")
+    across.press("Enter")
+    shown = settled(page, server)
+    assert server.session.edited.document["clearance"]["obstacles"][0]["position"][1] == -0.6125
+    assert_same(shown, saved(page, server))
+    # What is dragged tells where it is.
+    drag(page, "post", 1.0)
+    settled(page, server)
+    along = 1e3 * server.session.edited.document["clearance"]["obstacles"][0]["position"][0]
+    assert float(page.locator("[data-axis='0']").input_value()) == pytest.approx(along, abs=0.051)
+    page.locator("#letgo").click()
+    assert not page.locator("#place").is_visible()
+
+
+def test_it_says_why_the_arm_moves_as_it_does(page: Any, server: Served) -> None:
+    """By the motion, and by what stops it on the map beside the plan's line."""
+    page.locator("#maps:not(.stale) .map").wait_for(timeout=PATIENCE)
+    plan = settled(page, server)
+    page.wait_for_function("replay.plan.redundancy.length > 0", timeout=PATIENCE)
+    labels = page.evaluate("replay.plan.redundancy[0].slices.map(({ label }) => label)")
+    shown = page.evaluate("replay.maps.map.label")
+    found = server.session.found.maps[0].maps[labels.index(shown)]
+    k = len(found.times) // 3
+    page.evaluate("(time) => replay.seek(time)", float(found.times[k]))
+    said = page.locator("#why").inner_text()
+    q, qd = (plan.trajectory(found.times[k], order) for order in (0, 1))
+    shares = np.abs(qd) / plan.robot.velocity_limit
+    room = np.minimum(q - plan.robot.lower, plan.robot.upper - q)
+    assert f"{plan.robot.joint_names[int(np.argmax(shares))]} moves fastest" in said
+    assert f"{plan.robot.joint_names[int(np.argmin(room))]} is nearest to a limit" in said
+    assert f"What the path leaves free, the {shown}, is " in said
+    # The first pixel that is not allowed above the line then, and at its height later.
+    column, row = found.state[k], int(np.argmin(np.abs(found.coordinate - found.plan_line[k])))
+    scale = np.degrees(1.0) if found.unit == "rad" else 1e3
+    above = np.flatnonzero(column[row + 1 :] != 0)
+    told = re.search(r"has to be below (-?[\d.]+)", said)
+    assert (told is None) == (len(above) == 0)
+    if told is not None:
+        limit = scale * found.coordinate[row + 1 + above[0]]
+        assert float(told[1]) == pytest.approx(limit, abs=0.051)
+    later = np.flatnonzero(found.state[k + 1 :, row] != 0)
+    told = re.search(r" from ([\d.]+) s", said)
+    assert (told is None) == (len(later) == 0)
+    if told is not None:
+        time = found.times[k + 1 + later[0]] - found.times[0]
+        assert float(told[1]) == pytest.approx(time, abs=0.0051)
 
 
 def test_undo_goes_back(page: Any, server: Served) -> None:
@@ -240,9 +295,17 @@ def test_a_motion_is_exported(page: Any, server: Served) -> None:
     with page.expect_download() as found:
         page.locator("#export").select_option(".csv")
     assert found.value.suggested_filename == "circle.csv"
+    # Of the mass that ABB's programs need the page asks.
+    assert not page.locator("#load").is_visible()
     page.locator("#export").select_option(".mod")
     page.wait_for_selector("#told.bad")
-    assert "mass" in page.locator("#told").inner_text()
+    assert "type it beside Export" in page.locator("#told").inner_text()
+    with page.expect_download() as found:
+        page.locator("#mass").fill("1.5")
+        page.locator("#mass").press("Enter")
+    assert found.value.suggested_filename == "circle.mod"
+    text = Path(found.value.path()).read_text()
+    assert "[1.5000" in text or "[1.5," in text
 
 
 def test_joints_are_jogged_and_come_back(page: Any, server: Served) -> None:

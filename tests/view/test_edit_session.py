@@ -66,6 +66,25 @@ def test_sliders_set_what_is_planned(page):
     assert last(page).trajectory.duration == pytest.approx(4.0)
 
 
+def test_each_body_has_a_distance_of_its_own(page):
+    """Larger than the arm's own links can keep."""
+    slider = next(
+        one for one in page.messages[-1]["sliders"] if one["name"] == "clearance from post"
+    )
+    assert (slider["value"], slider["unit"]) == (5.0, "mm")
+    page.session.answer(
+        {"do": "slide", "name": "clearance from post", "value": 40.0, "final": True}
+    )
+    shown = last(page)
+    assert shown.certificate.verified
+    assert shown.approaches["post"].value >= 0.04
+    assert shown.approaches["the arm itself"].value < 0.04
+    document = page.session.edited.document["clearance"]
+    assert (document["distance_mm"], document["obstacles"][0]["distance_mm"]) == (5, 40.0)
+    page.session.answer({"do": "undo"})
+    last(page)
+
+
 def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     page.drag("path", moved(x=3.0))
     found = page.answer(page.session._revision)
@@ -80,28 +99,51 @@ def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     assert "stopped" not in page.messages[-1]
 
 
-def test_places_in_reach_are_told_while_something_is_dragged_and_no_longer(page):
+def test_places_in_reach_are_told_while_something_is_chosen(page):
     """They are those of the document that is shown: a path that is lifted has others."""
 
-    def places(by):
-        page.drag("path", by, final=False)
-        last(page)
-        return page.messages[-1]["floor"]["places"], page.session.found.placements
+    def are_all_there(found):
+        placements = page.session.found.placements
+        return (
+            found["number"] == page.session._revision
+            and "floor" in found
+            and placements is not None
+            and placements.is_done
+        )
 
-    _, before = places(moved(x=0.02, y=0.01))
-    _, same = places(moved(y=-0.03))
+    def places():
+        page.until(are_all_there)
+        return page.session.found.placements
+
+    def dragged(by, *, final=False):
+        page.drag("path", by, final=final)
+        return places()
+
+    before = dragged(moved(x=0.02, y=0.01))
+    same = dragged(moved(y=-0.03))
     np.testing.assert_allclose(same.positions, before.positions, atol=1e-6)
     np.testing.assert_array_equal(same.is_reachable, before.is_reachable)
-    _, lifted = places(moved(z=0.3))
+    lifted = dragged(moved(z=0.3))
     assert lifted.is_reachable.sum() < before.is_reachable.sum()
-    page.drag("path", moved(z=-0.3))
-    last(page)
-    assert "floor" not in page.messages[-1]
+    # They stay when it is let go, also where it is out of reach.
+    dragged(moved(z=-0.3), final=True)
+    away = dragged(moved(x=3.0), final=True)
+    assert page.messages[-1]["kind"] == "none"
+    assert away.is_reachable.any()
+    page.session.answer({"do": "undo"})
+    places()
     # Tools and posts stand wherever they are put.
     page.drag("post", moved(x=0.01), final=False)
     last(page)
     assert "floor" not in page.messages[-1]
     page.drag("post", moved(x=-0.01))
+    # What is chosen has them before it is dragged; of what is let go there are none.
+    shown = last(page)
+    page.session.answer({"do": "choose", "name": "path"})
+    places()
+    page.session.answer({"do": "choose", "name": ""})
+    assert last(page) is shown
+    assert "floor" not in page.messages[-1]
 
 
 def test_a_coarse_motion_comes_first_and_says_that_it_is_none(page):
@@ -132,7 +174,7 @@ def test_what_cannot_be_asked_is_refused_and_changes_nothing(page):
     before = page.session.edited.document
     for asked, said in (
         (5, "expected a table"),
-        ({"do": "shout"}, "expected drag, slide, undo or save"),
+        ({"do": "shout"}, "expected drag, choose, slide, undo or save"),
         ({"do": "drag", "name": "roof"}, "there is no 'roof' in this document, which has path"),
         ({"do": "slide", "name": "roof"}, "which has duration, clearance"),
         ({"do": "slide", "name": "duration", "value": "4"}, "expected a number"),
@@ -287,7 +329,7 @@ def test_a_plan_that_nobody_waits_for_is_left(tmp_path):
     planning.answer(Request(0, document))
     planning._tell = take
     with pytest.raises(NewerRequest):
-        planning.answer(Request(1, document))
+        planning.answer(Request(1, {**document, "task": "position"}))
     assert [one.request.number for one in found if one.kind == "whole"] == [0]
 
 

@@ -191,6 +191,7 @@ def test_sliders_are_what_the_document_says() -> None:
     assert {name: (one.value, one.unit) for name, one in found.items()} == {
         "duration": (4.0, "s"),
         "clearance": (5.0, "mm"),
+        "clearance from post": (5.0, "mm"),
         "tolerance of position": (1e-5, "m"),
         "band of z": (2.0, "mm"),
         "weight of JointVelocity": (2.0, ""),

@@ -201,7 +201,7 @@ def _each_once(
     models, distances = list[CollisionModel](), list[float]()
     known: dict[tuple[str, str], None] = {}
     for given, far in sorted(bodies, key=lambda each: -each[1]):
-        own = CollisionModel(robot, given.obstacles, [*given.disabled, *known])
+        own = CollisionModel(robot, given.obstacles, [*given.disabled, *known], given.only)
         if own.pairs or not models:
             models.append(own)
             distances.append(far)

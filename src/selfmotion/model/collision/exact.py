@@ -48,6 +48,8 @@ class CollisionModel:
         robot's immovable base is not checked against the world.
     disabled : sequence of (str, str)
         Pairs of links or obstacles that are left out; see `disabled_links` for those of an SRDF.
+    only : sequence of str
+        Names of obstacles: pairs of which neither is one of these are left out. By default none is.
 
     Attributes
     ----------
@@ -90,15 +92,24 @@ class CollisionModel:
         robot: RobotModel,
         obstacles: Sequence[Obstacle] = (),
         disabled: Sequence[tuple[str, str]] = (),
+        only: Sequence[str] = (),
     ) -> None:
         self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
+        self.only = tuple(only)
         self._bodies = (*links_of(robot).bodies, *obstacle_bodies(self.obstacles, robot))
         self.has_bodies = not all(body.is_obstacle for body in self._bodies)
         self.bodies = tuple(body.name for body in self._bodies)
         checked = checked_pairs(robot, self._bodies, self._disabled)
         self._counts = checked.counts
         self.overlapping, self.disabled = checked.overlapping, checked.disabled
-        self._take(checked.pairs)
+        of_these = frozenset(self.only)
+        self._take(
+            [
+                pair
+                for pair in checked.pairs
+                if not of_these or not of_these.isdisjoint(self.bodies[k] for k in pair)
+            ]
+        )
 
     def _take(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Check these pairs of bodies."""

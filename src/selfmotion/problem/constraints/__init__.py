@@ -25,6 +25,7 @@ from selfmotion.problem.constraints.clearance import (
     as_clearances as as_clearances,
     clearances_among as clearances_among,
     separate_clearances as separate_clearances,
+    with_own_distances as with_own_distances,
     without_clearances as without_clearances,
 )
 from selfmotion.problem.constraints.conditions import (

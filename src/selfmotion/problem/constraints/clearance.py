@@ -58,6 +58,8 @@ class Clearance(Constraint):
         File whose ``disable_collisions`` are left out as well. It is read once, here.
     disabled : sequence of (str, str)
         Pairs of links or obstacles that are left out.
+    only : sequence of str
+        Names of obstacles: pairs of which neither is one of these are left out. By default none is.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Clearance(Constraint):
     distance: float = 5e-3
     srdf: InitVar[str | Path | None] = None
     disabled: tuple[tuple[str, str], ...] = ()
+    only: tuple[str, ...] = ()
 
     def __post_init__(self, srdf: str | Path | None) -> None:
         given: Any = self.obstacles
@@ -90,6 +93,7 @@ class Clearance(Constraint):
         pairs = [_pair(item) for item in self.disabled]
         read = () if srdf is None else disabled_links(srdf)
         object.__setattr__(self, "disabled", tuple(dict.fromkeys((*pairs, *read))))
+        object.__setattr__(self, "only", self._only())
         distance = as_number(self.distance, "clearance: distance", least=0.0)
         if distance > _FARTHEST:
             raise ProblemError(
@@ -98,6 +102,20 @@ class Clearance(Constraint):
             )
         object.__setattr__(self, "distance", distance)
 
+    def _only(self) -> tuple[str, ...]:
+        """Return the names in `only`, or raise ProblemError."""
+        given: Any = self.only
+        known = [item.name for item in self.obstacles]
+        if not isinstance(given, list | tuple):
+            raise ProblemError(f"clearance: only is {shown(given)}, expected names of obstacles")
+        for name in given:
+            if name not in known:
+                raise ProblemError(
+                    f"clearance: only has {shown(name)}, which is none of its obstacles; expected "
+                    f"one of {', '.join(known)}"
+                )
+        return tuple(given)
+
     @property
     def is_no_overlap(self) -> bool:
         """Whether it asks no more than that links do not overlap, which they rarely do."""
@@ -105,7 +123,12 @@ class Clearance(Constraint):
 
     def keeps_as_far(self, other: Clearance) -> bool:
         """Return whether it keeps all that another does of the arm itself and its own bodies."""
-        return self.distance >= other.distance and set(self.disabled) <= set(other.disabled)
+        keeps_pairs = not self.only or (bool(other.only) and set(other.only) <= set(self.only))
+        return (
+            keeps_pairs
+            and self.distance >= other.distance
+            and set(self.disabled) <= set(other.disabled)
+        )
 
     @override
     def applies(self, robot: RobotModel) -> bool:
@@ -151,6 +174,8 @@ class Clearance(Constraint):
             "obstacles": [obstacle.to_dict() for obstacle in self.obstacles],
             "distance": self.distance,
             "disabled": [list(pair) for pair in self.disabled],
+            # Files of before have none.
+            **({"only": list(self.only)} if self.only else {}),
         }
 
     def _models(self, robot: RobotModel) -> _Models:
@@ -185,6 +210,46 @@ def as_clearances(given: Any) -> tuple[Clearance, ...]:
     raise ProblemError(
         f"clearance is {shown(given)}, expected a Clearance, a list of several, or None"
     )
+
+
+def with_own_distances(clearance: Clearance, own: Mapping[str, float]) -> tuple[Clearance, ...]:
+    """Return a clearance, and one for each of its obstacles with a distance of its own (by name).
+
+    Raises
+    ------
+    ProblemError
+        The clearance is `only` of some obstacles.
+    """
+    apart = [item for item in clearance.obstacles if item.name in own]
+    if not apart:
+        return (clearance,)
+    if clearance.only:
+        raise ProblemError(
+            f"clearance: is only of {', '.join(clearance.only)}, and obstacle '{apart[0].name}' "
+            f"has a distance of its own; give one of the two"
+        )
+    rest = tuple(item for item in clearance.obstacles if item.name not in own)
+    found = [_of_obstacles(clearance, rest, clearance.distance)]
+    for item in apart:
+        # What stands does not come near to what stands.
+        others = (
+            other
+            for other in clearance.obstacles
+            if other is not item and (item.frame is not None or other.frame is not None)
+        )
+        found.append(_of_obstacles(clearance, (item, *others), own[item.name], item.name))
+    return tuple(found)
+
+
+def _of_obstacles(
+    clearance: Clearance, obstacles: Sequence[Obstacle], distance: float, only: str = ""
+) -> Clearance:
+    """Return a clearance of some obstacles, and of one of them alone, at another distance."""
+    left = {item.name for item in clearance.obstacles} - {item.name for item in obstacles}
+    disabled = tuple(
+        pair for pair in clearance.disabled if left.isdisjoint(pair) and (not only or only in pair)
+    )
+    return Clearance(tuple(obstacles), distance, disabled=disabled, only=(only,) if only else ())
 
 
 def clearances_among(constraints: Sequence[Constraint]) -> tuple[Clearance, ...]:
@@ -222,7 +287,7 @@ class _Models:
     """The exact model of a clearance, and the one that the optimiser follows."""
 
     def __init__(self, wanted: Clearance, robot: RobotModel) -> None:
-        self.exact = CollisionModel(robot, wanted.obstacles, wanted.disabled)
+        self.exact = CollisionModel(robot, wanted.obstacles, wanted.disabled, wanted.only)
         self._near = wanted.distance + _NEAR
         if not self.exact.has_bodies:
             raise ProblemError(

@@ -27,6 +27,7 @@ class BodyTable(PoseTable, Table):
         "The link that carries it, in whose frame it is placed then: a torch, a camera, a part in "
         "hand, a fixture on a table that turns. By default the world."
     )
+    distance: Length = key("Smallest distance from it [m]; by default that of the clearance.")
 
     def build(
         self, context: Context, place: SE3 | None = None, carrier: str | None = None
@@ -34,6 +35,7 @@ class BodyTable(PoseTable, Table):
         """Return the body; with a `place`, that of the workpiece, which a link may carry."""
         where = "" if place is None else "workpiece: "
         values = self.given
+        values.pop("distance", None)
         try:
             pose = pose_of({name: values.pop(name) for name in _POSE if name in values})
         except ValueError as error:

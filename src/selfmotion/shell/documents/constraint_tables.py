@@ -201,6 +201,9 @@ class ClearanceTable(Table):
     obstacles: list[StandingBody] = key("Obstacles in the world, and bodies attached to links.", [])
     distance: Length = key("Smallest distance [m].", 5e-3)
     disabled: list[Names] = key("Pairs of links or obstacles that are left out.", [])
+    only: Names = key(
+        "Obstacles: pairs of which neither is one of these are left out. By default none is.", []
+    )
     srdf: File = key("File whose `disable_collisions` are left out as well.")
 
     def build(
@@ -215,7 +218,8 @@ class ClearanceTable(Table):
             srdf, given = context.beside(self.srdf), (context.arguments, context.packages)
             disabled += disabled_links(srdf, *given)
             context.notes.extend(srdf_notes(srdf, *given))
-        return Clearance((*obstacles, *bodies), distance, disabled=tuple(disabled))
+        only = tuple(self.only)
+        return Clearance((*obstacles, *bodies), distance, disabled=tuple(disabled), only=only)
 
 
 class ClearanceConstraint(ClearanceTable):

@@ -20,7 +20,9 @@ from selfmotion.problem.constraints import (
     NO_OVERLAP,
     Clearance,
     Constraint,
+    as_clearances,
     separate_clearances,
+    with_own_distances,
 )
 from selfmotion.problem.problem import Problem, problem_to_dict
 from selfmotion.shell.documents.body_tables import WorkpieceTable
@@ -270,7 +272,20 @@ class SharedTable(PartTable):
             context.notes.append(_FORMER_CLEARANCE_NOTE)
             found["constraints"], several = separate_clearances(found["constraints"], apart)
             apart = several if len(several) > 1 else several[0]
+        with context.naming("clearance"):
+            apart = self._with_own_distances(apart, former)
         return {**found, **({} if apart is NO_OVERLAP else {"clearance": apart})}
+
+    def _with_own_distances(self, apart: Any, former: Sequence[ClearanceTable]) -> Any:
+        """Return clearances in which bodies with a distance of their own have one of their own."""
+        given = self.clearance if isinstance(self.clearance, list) else [self.clearance]
+        tables = [*former, *(item for item in given if isinstance(item, ClearanceTable))]
+        bodies = [body for table in tables for body in table.obstacles]
+        bodies += [] if self.workpiece is None else self.workpiece.obstacles
+        own = {body.name: body.distance for body in bodies if body.distance is not None}
+        if not own:
+            return apart
+        return tuple(one for item in as_clearances(apart) for one in with_own_distances(item, own))
 
     def _apart(self, context: Context, bodies: Sequence[Obstacle]) -> Any:
         """Return the clearance, or several, of which the first looks at further bodies."""

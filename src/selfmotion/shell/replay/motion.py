@@ -192,20 +192,26 @@ def curves(
     clock = clock_of(trajectory, times)
     q, qd, qdd = (trajectory(clock, order) for order in range(3))
     asked = torque_limits(plan)
-    target, carrier = follow.path.samples(clock), np.empty((points, 4, 4))
-    manipulability, ellipsoid = np.empty(points), np.empty((points, 3, 3))
-    errors, tool, rotation = np.empty((points, 2)), np.empty((points, 3)), np.empty((points, 3, 3))
-    for k in range(points):
-        jacobian, turn, place = chain.at(q[k])
-        pose, reference = SE3(turn, place), world.place(q[k])
-        rows = plan.problem.follows.jacobian(q[k])
-        manipulability[k] = np.prod(np.linalg.svd(rows, compute_uv=False))
-        shape = _velocity_ellipsoid(jacobian, task)
-        ellipsoid[k] = reference.rotation @ shape @ reference.rotation.T
-        errors[k] = task.miss(SE3(target.rotation[k], target.translation[k]), pose)
-        carried = base * pose
-        tool[k], rotation[k] = carried.translation, carried.rotation
-        carrier[k] = (reference * base.inverse()).homogeneous
+    target = follow.path.samples(clock)
+    jacobians, turns, places = chain.along(q)
+    _, frames, origins = world.along(q)
+    rows = plan.problem.follows.jacobians(q)
+    shapes = _velocity_ellipsoids(jacobians, task)
+    errors = np.array(
+        [
+            task.miss(SE3(*wanted), SE3(*reached))
+            for wanted, reached in zip(
+                zip(target.rotation, target.translation, strict=True),
+                zip(turns, places, strict=True),
+                strict=True,
+            )
+        ]
+    )
+    # The reference frame of what is followed, as it is carried along, in world axes.
+    carrier = np.zeros((points, 4, 4))
+    carrier[:, :3, :3] = frames @ base.rotation.T
+    carrier[:, :3, 3] = origins - carrier[:, :3, :3] @ base.translation
+    carrier[:, 3, 3] = 1.0
     window = 2 * (points // 100) + 1
     return Curves(
         t=times,
@@ -213,24 +219,26 @@ def curves(
         qd=qd,
         qdd=qdd,
         torque=None if asked is None else asked.values(q, qd, qdd),
-        manipulability=manipulability,
+        manipulability=np.prod(np.linalg.svd(rows, compute_uv=False), axis=1),
         position_error=maximum_filter1d(errors[:, 0], window),
         rotation_error=maximum_filter1d(errors[:, 1], window),
-        tool=tool,
-        rotation=rotation,
+        tool=places @ base.rotation.T + base.translation,
+        rotation=base.rotation @ turns,
         carrier=carrier,
-        ellipsoid=ellipsoid,
+        ellipsoid=frames @ shapes @ frames.transpose(0, 2, 1),
     )
 
 
-def _velocity_ellipsoid(jacobian: Array, task: Task) -> Array:
-    linear = np.zeros((3, jacobian.shape[1]))
+def _velocity_ellipsoids(jacobians: Array, task: Task) -> Array:
+    """Return the matrices (K, 3, 3) of the tool's velocity ellipsoids, of Jacobians (K, 6, n)."""
+    linear = np.zeros((len(jacobians), 3, jacobians.shape[2]))
     rows = task.rows[task.rows < 3]
-    linear[rows] = jacobian[rows]
-    values, vectors = np.linalg.eigh(linear @ linear.T)
+    linear[:, rows] = jacobians[:, rows]
+    values, vectors = np.linalg.eigh(linear @ linear.transpose(0, 2, 1))
     lengths = np.sqrt(np.maximum(values, 0.0))
     # Flat where the tool cannot move; a little thickness gives the surface a normal.
-    return np.asarray((vectors * np.maximum(lengths, 0.02 * lengths[-1])) @ vectors.T)
+    lengths = np.maximum(lengths, 0.02 * lengths[:, -1:])
+    return np.asarray((vectors * lengths[:, None]) @ vectors.transpose(0, 2, 1))
 
 
 # A distance query costs milliseconds, a hundred times one point of the other curves.

@@ -42,7 +42,16 @@ _THREE = "three/three.min.js"
 # Scripts of a page that a server changes; they run before the last of the others.
 _LIVE = ("handles.js", "live.js")
 # Scripts of the page, in the order in which they run.
-_SCRIPTS = ("payload.js", "viewer.js", "stage.js", "plots.js", "map.js", "tools.js", "page.js")
+_SCRIPTS = (
+    "payload.js",
+    "viewer.js",
+    "stage.js",
+    "plots.js",
+    "map.js",
+    "why.js",
+    "tools.js",
+    "page.js",
+)
 
 
 def replay_html(

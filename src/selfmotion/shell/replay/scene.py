@@ -133,7 +133,14 @@ def stage_commands(box: Extent) -> list[Json]:
         three.set_object(
             f"{_ROOT}/stage/ground",
             {"type": "PlaneGeometry", "width": 12 * reach, "height": 12 * reach},
-            {"type": "ShadowMaterial", "color": 0, "opacity": 0.16, "transparent": True},
+            # It hides nothing: tables and floors may be below it.
+            {
+                "type": "ShadowMaterial",
+                "color": 0,
+                "opacity": 0.16,
+                "transparent": True,
+                "depthWrite": False,
+            },
             ground,
         ),
         _grid(center, reach, float(box.low[2])),

@@ -20,7 +20,7 @@ h1 { font-size: 15pt; margin: 0 0 2mm } h2 { font-size: 11pt; margin: 4mm 0 1mm 
 table { border-collapse: collapse; width: 100% }
 td, th { text-align: left; vertical-align: top; padding: .4mm 3mm .4mm 0 }
 td { border-top: .2mm solid #ccc }
-td:first-child:not(:last-child) { min-width: 18mm }
+td:first-child:not(:last-child) { min-width: 18mm } .whole { white-space: nowrap }
 th { font-weight: 600 } p { margin: 1mm 0 } .note { color: #555; font-size: 9pt }
 .verified { color: #00695c; font-weight: 600 } .refused { color: #b71c1c; font-weight: 600 }
 section { break-inside: avoid } td.numbered { border-left: 1.2mm solid; padding-left: 2mm }
@@ -160,6 +160,8 @@ def _sentences(margins: Margins | Mapping[str, Margins] | None) -> Iterator[str]
         yield from (f"Seam '{name}': {each.sentence}" for name, each in margins.items())
 
 
+# Texts of so few letters are written in one line.
+_SHORT, _WHOLE = 9, ' class="whole"'
 # Where the sheet is signed.
 _RELEASE = (
     "<section><h2>Release</h2><table class='release'><tr>"
@@ -202,5 +204,9 @@ def _drawn(section: Section) -> str:
 
 def _row(row: tuple[str, ...], color: str) -> str:
     mark = f' class="numbered" style="border-left-color:{color}"' if color else ""
-    first, *others = (html.escape(cell) for cell in row)
-    return f"<tr><td{mark}>{first}</td>{''.join(f'<td>{cell}</td>' for cell in others)}</tr>"
+    first, *others = row
+    # A number stays with its unit.
+    cells = "".join(
+        f"<td{_WHOLE if len(cell) <= _SHORT else ''}>{html.escape(cell)}</td>" for cell in others
+    )
+    return f"<tr><td{mark}>{html.escape(first)}</td>{cells}</tr>"

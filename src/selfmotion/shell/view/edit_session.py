@@ -50,6 +50,8 @@ class EditSession(PageSession):
         self._initial_document = dict(self.edited.document)
         # The number of changes, the id of the last request, and the number of drags.
         self._revision = self._request_id = self._drags = 0
+        # The name of the handle that is chosen; "" for none.
+        self._chosen = ""
         # The last plan, and the handles and sliders of its document.
         self._last_plan: Plan | None = None
         self._handles: dict[str, Handle] = {}
@@ -81,6 +83,7 @@ class EditSession(PageSession):
             if self._send is None:
                 # A new page starts its request ids at 0.
                 self._request_id = 0
+                self._chosen = ""
         return super().attach(send)
 
     @override
@@ -106,6 +109,10 @@ class EditSession(PageSession):
                 self._drag(request)
             case "slide":
                 self._slide(request)
+            case "choose":
+                name = request.get("name")
+                self._chosen = name if isinstance(name, str) else ""
+                self._request_plan()
             case "undo":
                 self.edited.undo()
                 self._request_plan()
@@ -114,7 +121,7 @@ class EditSession(PageSession):
                 return {"saved": f"Saved {self.edited.saves}.", **self._state()}
             case other:
                 raise ProblemError(
-                    f"the page asks for {shown(other)}, expected drag, slide, undo or save"
+                    f"the page asks for {shown(other)}, expected drag, choose, slide, undo or save"
                 )
         return None
 
@@ -125,7 +132,8 @@ class EditSession(PageSession):
         values = dragged(self.edited.document, handle, _pose(request.get("matrix")))
         final = bool(request.get("final"))
         self.edited.change(values, final=final)
-        self._request_plan(None if final else (self._drags, handle.name))
+        self._chosen = handle.name
+        self._request_plan(is_held=not final)
         if final:
             self._drags += 1
 
@@ -157,9 +165,10 @@ class EditSession(PageSession):
 
     # The planner.
 
-    def _request_plan(self, drag: tuple[int, str] | None = None) -> None:
+    def _request_plan(self, *, is_held: bool = False) -> None:
         self._revision += 1
-        self._planning.ask(Request(self._revision, self.edited.document, drag))
+        drag = (self._drags, self._chosen) if self._chosen else None
+        self._planning.ask(Request(self._revision, self.edited.document, drag, is_held))
 
     @override
     def _state(self) -> Json:

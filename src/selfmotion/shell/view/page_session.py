@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -188,13 +189,20 @@ class PageSession:
             )
         return outcome
 
-    def export(self, suffix: str) -> bytes:
+    def export(self, suffix: str, mass: float | None = None) -> bytes:
         """Return the motion as a file for a controller, or as a plan's or program's own file.
+
+        Parameters
+        ----------
+        suffix : str
+        mass : float, optional
+            Of what the flange carries [kg], which ABB's programs say; by default that of the
+            settings.
 
         Raises
         ------
         ProblemError
-            The suffix is of no format.
+            The suffix is of no format, or the mass is missing.
         PlanError
             What is shown is not verified, or is being planned.
         """
@@ -203,13 +211,20 @@ class PageSession:
         outcome = self.current("exported")
         if not outcome.verified or outcome.plan is None:
             raise PlanError(f"{outcome.words}; nothing is exported until it is verified")
+        settings = None
+        if suffix in (".script", *PROGRAMS):
+            settings = self.settings or ProgramSettings()
+            settings = settings if mass is None else replace(settings, mass=mass)
+        if suffix == ".mod" and settings is not None and settings.mass is None:
+            raise ProblemError(
+                "a controller of ABB moves by the mass that the flange carries: type it beside "
+                "Export, or give it in the file of --settings"
+            )
         made = outcome.plan if outcome.made is None else outcome.made
         with TemporaryDirectory(prefix="selfmotion-") as folder:
             file = Path(folder) / f"{self.file.stem}{suffix}"
             if suffix in _OWN:
                 made.save(file)
             else:
-                # Others have none.
-                settings = self.settings if suffix in (".script", *PROGRAMS) else None
                 write_motion(made, file, settings=settings)
             return file.read_bytes()

@@ -74,6 +74,8 @@ class Planning:
         self._last_map: tuple[Any, PlacementMap | None] = None, None
         self._maps: dict[int, PlacementMap | None] = {}
         self._first: Outcome | None = None
+        # What was planned last: the same document is not planned again.
+        self._found: Outcome | None = None
         self.last: Plan | None = None
         self.last_program: Program | None = None
         self._thread = threading.Thread(target=self._run, name="planning", daemon=True)
@@ -128,25 +130,51 @@ class Planning:
         """Tell of the motions that are found for a request; return the last one."""
         if len(self._cache) > _KEPT:
             self._cache.clear()
-        answers = self._programs if is_job(request.document) else self._plans
         outcome = Outcome(request, "none", "", None)
-        for outcome in answers(request):
-            # As long as the hand stays there what is found has them, too.
+        for outcome in self._answers(request):
             outcome = replace(outcome, placements=self._maps.get(request.number))
             self._tell(outcome)
         self._leave(request)
+        self._found = outcome
         return outcome
+
+    def _answers(self, request: Request) -> Iterator[Outcome]:
+        """Return what is found for a request, one after the other."""
+        found = self._found
+        if found is not None and found.verified and found.request.document == request.document:
+            # Another handle is chosen, or one is released where it was.
+            found = replace(found, request=request)
+            self._maps = {request.number: self._placements_of(found)}
+            return iter((found,))
+        return (self._programs if is_job(request.document) else self._plans)(request)
 
     def _more(self, outcome: Outcome) -> None:
         """Tell what takes longer, where nothing newer is asked for."""
-        if outcome.kind != "whole" or not self._is_calm(outcome.request):
+        if not self._is_calm(outcome.request):
             return
-        outcome = replace(outcome, is_brief=False)
-        self._tell(outcome)
+        if outcome.kind == "whole" and outcome.is_brief:
+            outcome = self._found = replace(outcome, is_brief=False)
+            self._tell(outcome)
+        outcome = self._placed(outcome)
+        if outcome.kind != "whole" or outcome.maps:
+            return
         maps = tuple(maps_soon(outcome, self._stage(outcome.request)))
         if maps:
             self._leave(outcome.request)
-            self._tell(replace(outcome, maps=maps))
+            self._found = replace(outcome, maps=maps)
+            self._tell(self._found)
+
+    def _placed(self, outcome: Outcome) -> Outcome:
+        """Return what is found with the whole placement map of the handle that is chosen."""
+        placements = self._placements_of(outcome)
+        if placements is None or (placements.is_done and outcome.placements is placements):
+            return outcome
+        while not placements.is_done:
+            placements.test_next()
+            self._leave(outcome.request)
+        outcome = replace(outcome, placements=placements)
+        self._tell(outcome)
+        return outcome
 
     def _plans(self, request: Request) -> Iterator[Outcome]:
         """Yield what is found for a problem."""
@@ -227,34 +255,46 @@ class Planning:
     def _with_placements(
         self, outcome: Outcome, problems: Sequence[Problem], near: Sequence[Array]
     ) -> Iterator[Outcome]:
-        """Yield a first motion; while something is dragged, with its placement map.
+        """Yield a first motion; while something is dragged, with its placement map."""
+        request = outcome.request
+        placements = self._placements(outcome, problems, near)
+        self._maps = {request.number: placements}
+        yield outcome
+        # One batch at least, so that a drag without a rest has all of them in the end. What is
+        # released is planned first.
+        while request.is_held and placements is not None and not placements.is_done:
+            placements.test_next()
+            self._leave(request)
+            if placements.is_done:
+                yield outcome
 
-        The map is made once for all that is moved to and fro.
+    def _placements_of(self, outcome: Outcome) -> PlacementMap | None:
+        """Return the placement map of the handle that is chosen, with the plans that are there."""
+        plans = _plans_of(outcome)
+        problems = [each.problem for each in plans]
+        return self._placements(outcome, problems, [each.trajectory.q for each in plans])
+
+    def _placements(
+        self, outcome: Outcome, problems: Sequence[Problem], near: Sequence[Array]
+    ) -> PlacementMap | None:
+        """Return the placement map of the handle that is chosen; None where it has none.
+
+        It is made once for all that is moved to and fro.
         """
         request, plan = outcome.request, outcome.plan
-        if request.drag is None or plan is None:
-            yield outcome
-            return
-        number, name = request.drag
-        handle = handles_of(request.document, plan.problem).get(name)
+        if request.drag is None or plan is None or not problems:
+            return None
+        handle = handles_of(request.document, plan.problem).get(request.drag[1])
         if handle is None:
-            yield outcome
-            return
+            return None
         pose = handle.prefix * handle.pose
-        key = (number, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
+        key = (request.drag, round(float(pose.translation[2]), 6), pose.rotation.round(6).tobytes())
         last_key, placements = self._last_map
         if last_key != key:
             can_move = PlacementMap.can_move(problems, handle)
             placements = PlacementMap(problems, near, handle) if can_move else None
             self._last_map = key, placements
-        self._maps = {request.number: placements}
-        yield outcome
-        # One batch at least, so that a drag without a rest has all of them in the end.
-        while placements is not None and not placements.is_done:
-            placements.test_next()
-            self._leave(request)
-            if placements.is_done:
-                yield outcome
+        return placements
 
     def _early(self, request: Request, job: SeamJob, before: Program) -> Program | None:
         """Return a verified program in the order before; None where there is none."""
@@ -307,3 +347,10 @@ class Planning:
 
     def _told(self, error: SelfmotionError) -> str:
         return str(error).removeprefix(f"{self._file}: ")
+
+
+def _plans_of(outcome: Outcome) -> Sequence[Plan]:
+    """Return the plans whose paths move with the part; of what has no motion the stand-in."""
+    if isinstance(outcome.made, Program):
+        return tuple(outcome.made.plans.values())
+    return (outcome.replayed.plan,) if isinstance(outcome.replayed, PlanReplay) else ()

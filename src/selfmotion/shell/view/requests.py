@@ -21,12 +21,15 @@ class Request:
         Requests are counted; the last one counts.
     document : dict
     drag : (int, str) or None
-        While a handle is dragged: the how manieth drag it is, and the handle's name.
+        Of a handle that is chosen: the how manieth drag it is, and the handle's name.
+    is_held : bool
+        Whether the handle is being dragged.
     """
 
     number: int
     document: Mapping[str, Any]
     drag: tuple[int, str] | None = None
+    is_held: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ class Outcome:
     maps : tuple of SeamMaps
         Redundancy maps, when they are made.
     placements : PlacementMap or None
-        While a handle is dragged: where it could be as well.
+        Of a handle that is chosen: where it could be as well.
     is_brief : bool
         Whether there is more to tell of it, which takes longer: distances, the redundancy map.
     """

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from selfmotion.basics import RenderError, SelfmotionError
+from selfmotion.basics import ProblemError, RenderError, SelfmotionError
 from selfmotion.shell.view.page_session import PageSession
 
 if TYPE_CHECKING:
@@ -178,7 +178,8 @@ class _Answers:
             return _refused(why)
         suffix = request.query_params.get("as", "")
         try:
-            data = await asyncio.to_thread(self._session.export, suffix)
+            mass = _mass(request.query_params.get("mass", ""))
+            data = await asyncio.to_thread(self._session.export, suffix, mass)
         except SelfmotionError as error:
             return PlainTextResponse(f"{error}\n", status_code=409, headers=_HEADERS)
         # Headers are Latin-1: other letters of the name are told as those of an address are.
@@ -222,6 +223,14 @@ class _Answers:
             await _both(connection, self._session, outgoing)
         finally:
             self._session.detach()
+
+
+def _mass(given: str) -> float | None:
+    """Return a mass that the page has typed [kg]; None where it is empty."""
+    try:
+        return float(given) if given else None
+    except ValueError:
+        raise ProblemError(f"mass: is {given!r}, expected a number of kg") from None
 
 
 def _refused(why: str) -> "Response":

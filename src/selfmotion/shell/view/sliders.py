@@ -24,6 +24,8 @@ _OF_TOLERANCE = {
 # Of more seams none has a slider of its own.
 _MAX_SEAMS = 12
 _WEIGHTS = ("weight", "mu")
+# Of more bodies none has a slider of its own.
+_MAX_BODIES = 8
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,9 @@ def _clearance(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterato
     elif not tables and isinstance(given, Mapping):
         tables = [("clearance",)]
     for number, keys in enumerate(tables, start=1):
+        only = at(document, (*keys, "only"))
         name = "clearance" if len(tables) == 1 else f"clearance {number}"
+        name = f"clearance from {', '.join(only)}" if only else name
         key = "distance_mm" if at(document, (*keys, "distance_mm")) is not None else "distance"
         unit, most = ("mm", 1e3 * _CLEARANCES) if key.endswith("_mm") else ("m", _CLEARANCES)
         value = at(document, (*keys, key))
@@ -130,6 +134,27 @@ def _clearance(document: Mapping[str, Any], begun: Mapping[str, Any]) -> Iterato
         first = at(begun, (*keys, key))
         high = max(most, 2.0 * value, 2.0 * first if _is_number(first) else 0.0)
         yield Slider(name, (*keys, key), value, 0.0, high, unit, even=True)
+        # Those of the workpiece are kept clear of as the first clearance says.
+        places = [keys, *([("workpiece",)] if number == 1 else [])]
+        bodies = [(*way, "obstacles", k) for way in places for k in range(_count(document, way))]
+        for body in bodies if len(bodies) <= _MAX_BODIES and not only else ():
+            yield _from_body(document, body, value if unit == "mm" else 1e3 * value)
+
+
+def _count(document: Mapping[str, Any], keys: Keys) -> int:
+    """Return how many obstacles a table has."""
+    return len(at(document, (*keys, "obstacles")) or ())
+
+
+def _from_body(document: Mapping[str, Any], keys: Keys, usual: float) -> Slider:
+    """Return the slider of the distance from one body; by default that of its clearance [mm]."""
+    body = at(document, keys)
+    key = "distance" if "distance" in body else "distance_mm"
+    scale = 1e-3 if key == "distance" else 1.0
+    value = float(body.get(key, scale * usual))
+    high = max(1e3 * scale * _CLEARANCES, 2.0 * value)
+    unit = "m" if key == "distance" else "mm"
+    return Slider(f"clearance from {body['name']}", (*keys, key), value, 0.0, high, unit, even=True)
 
 
 def _is_number(value: Any) -> bool:

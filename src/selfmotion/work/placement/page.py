@@ -19,7 +19,8 @@ body { margin: 1em auto; padding: 0 1em; max-width: 76em }
 h1 { font-size: 1.4em; margin: 0 0 .3em } h2 { font-size: 1.05em; margin: 1em 0 .3em }
 p { margin: .3em 0 } svg { display: block; width: 100%; height: auto; max-height: 92vh }
 table { border-collapse: collapse } summary { cursor: pointer; margin: .6em 0 }
-td, th { padding: .25em .8em .25em 0; text-align: right; border-bottom: 1px solid #ddd }
+td, th { padding: .25em .8em .25em 0; text-align: right; white-space: nowrap;
+  border-bottom: 1px solid #ddd }
 .key { display: flex; flex-wrap: wrap; gap: .2em 1.2em; margin: .4em 0; font-size: .9em }
 .key i { display: inline-block; width: 1.4em; height: .9em }
 .key i { margin-right: .4em; vertical-align: -1px }

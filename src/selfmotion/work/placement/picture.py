@@ -25,6 +25,8 @@ _NO_PLAN, _OUT_OF_REACH = "#f2cfcb", "#e4e7ec"
 _CONTOURS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 # Of more cells to a side none has its number written in it, and not each its label.
 _WRITTEN = 9
+# Numbers as near as this, to the side and up, are over each other.
+_NUMBER = (48.0, 14.0)
 LENGTHS = ("x", "y", "z")
 
 
@@ -133,9 +135,18 @@ class _Drawing:
                 )
                 if not reason and count <= _WRITTEN:
                     ink = "#222" if share > 0.4 else "#fff"
-                    place = self._x(across), self._y(up) + 0.5 * high - 5.0
+                    place = self._place_of_cost(across, up)
                     yield _text(*place, f"{cost:.3g}", fill=ink, size=12)
                 yield "</g>"
+
+    def _place_of_cost(self, across: float, up: float) -> tuple[float, float]:
+        """Return where the cost of a place is written."""
+        return self._x(across), self._y(up) + 0.5 * self._high / len(self._up) - 5.0
+
+    def _is_free(self, x: float, y: float) -> bool:
+        """Whether a number there is over no cost."""
+        costs = (self._place_of_cost(across, up) for across in self._across for up in self._up)
+        return all(abs(x - i) > _NUMBER[0] or abs(y - j) > _NUMBER[1] for i, j in costs)
 
     def contours(self) -> Iterator[str]:
         """Yield lines of equal cost, each with how much dearer it is."""
@@ -150,8 +161,10 @@ class _Drawing:
             way = "".join(f"M{self._at(*one)}L{self._at(*other)}" for one, other in lines)
             yield f'<path d="{way}" fill="none" stroke="#222" stroke-width="1.2"/>'
             # Each elsewhere along its line, so that no number is over another one.
-            (i, j), _ = lines[number * len(lines) // (len(known) + 1)]
-            x, y = map(float, self._at(i, j).split(","))
+            wanted = number * len(lines) // (len(known) + 1)
+            points = [tuple(map(float, self._at(*one).split(","))) for one, _ in lines]
+            order = sorted(range(len(points)), key=lambda k: abs(k - wanted))
+            x, y = points[next((k for k in order if self._is_free(*points[k])), wanted)]
             # White below, so that it can be read on its line.
             halo = ' stroke="#fff" stroke-width="3" paint-order="stroke"'
             yield _text(x, y + 4.0, f"+{more:.0%}", size=11, more=halo)

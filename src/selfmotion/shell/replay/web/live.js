@@ -28,11 +28,15 @@ class Live {
     get("second").hidden = page.content.plans[0].steps.length > 0;
     if (page.stage) {
       this.handles = new Handles(page.stage, page.content.radius,
-        (name, matrix, final) => this.ask({ do: "drag", name, matrix, final }), (handle) => this.chose(handle));
+        (name, matrix, final) => this.drag(name, matrix, final), (handle) => this.chose(handle));
     }
+    if (page.stage) page.stage.also = () => [...this.handles.shown.values()].map(
+      ({ mark }) => mark.getWorldPosition(new THREE.Vector3()).toArray());
+    for (const input of this.places) input.addEventListener("change", () => this.put(input));
     get("undo").addEventListener("click", () => this.ask({ do: "undo" }));
     get("save").addEventListener("click", () => this.ask({ do: "save" }));
-    get("export").addEventListener("change", () => this.export());
+    get("export").addEventListener("change", () => this.export(get("export").value));
+    get("mass").addEventListener("change", () => this.export(".mod"));
     get("second").addEventListener("click", () => (this.beside ? this.compare() : get("secondfile").click()));
     get("secondfile").addEventListener("change", ({ target }) => { if (target.files.length) this.compare(target.files[0]); });
     get("turns").addEventListener("click", () => this.handles?.setTurns(!this.handles.turns) ?? this.drawTurns());
@@ -40,6 +44,9 @@ class Live {
     window.addEventListener("beforeunload", (event) => { if (this.changed) event.preventDefault(); });
     this.connect();
   }
+
+  // Where what is chosen stands: x, y, z.
+  get places() { return [...get("place").querySelectorAll("input")]; }
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/live?token=${encodeURIComponent(this.token)}`);
@@ -65,7 +72,8 @@ class Live {
   ask(asked) {
     if (this.socket.readyState !== WebSocket.OPEN) return;
     this.say("");
-    if (asked.do !== "save") {
+    // What does not change the document leaves its plan as it is.
+    if (asked.do !== "save" && asked.do !== "choose") {
       this.asked += 1;
       this.wait();
     }
@@ -86,10 +94,7 @@ class Live {
 
   // A short answer: what cannot be done, or that it is saved. A plan of what is answers either.
   hear(answer) {
-    if (answer.error) {
-      this.say(answer.error, true);
-      return;
-    }
+    if (answer.error) return this.say(answer.error, true);
     if (answer.saved) this.say(answer.saved);
     this.state(answer);
   }
@@ -117,7 +122,7 @@ class Live {
       this.drawHandles(handles);
       if (coarse) this.handles?.carry();
     }
-    this.drawFloor(this.handles?.gripped ? message.floor : undefined);
+    this.drawFloor(this.handles?.chosen ? message.floor : undefined);
     if (!coarse) this.drawNumbers(message.table);
     get("plots").classList.toggle("stale", brief);
     if (brief) get("maps").classList.add("stale");
@@ -132,6 +137,7 @@ class Live {
     const verified = message.plans?.[0].verified && !open;
     get("verdict").textContent = open && message.kind !== "coarse" ? "planning …" : message.words;
     get("verdict").className = open ? "coarse" : verified ? "verified" : "";
+    get("state").textContent = open ? "planning …" : verified ? "verified" : "not verified, see above";
     get("figures").classList.toggle("stale", open);
     this.page.stage?.setGrey(!verified);
     // A program in the order before is verified, and not the last word.
@@ -178,23 +184,50 @@ class Live {
 
   drawHandles(handles) {
     const names = handles.map(({ name }) => name);
+    const { chosen } = this.handles ?? {};
+    if (chosen && !this.handles.gripped) this.drawPlace(chosen.matrix);
     if (String(names) === String(this.named)) return;
     this.named = names;
     get("handles").replaceChildren();
     for (const name of names) {
       const button = element(get("handles"), "button", { type: "button", "data-handle": name, "aria-pressed": false }, name);
-      button.addEventListener("click", () => this.handles?.choose(this.handles.name === name ? undefined : name));
+      button.addEventListener("click", () => {
+        this.handles?.choose(this.handles.name === name ? undefined : name);
+        get("scene").scrollIntoView({ block: "nearest" });
+      });
     }
     this.chose(this.handles?.chosen);
   }
 
   chose(handle) {
+    if (handle?.name !== this.chosenName) this.ask({ do: "choose", name: handle?.name ?? "" });
+    if (!handle) this.drawFloor(undefined);
+    this.chosenName = handle?.name;
+    get("from").textContent = handle?.node ? "mm from what carries it" : "mm";
+    get("place").hidden = !handle?.moves;
+    if (handle) this.drawPlace(handle.matrix);
     for (const button of get("handles").children) {
       button.setAttribute("aria-pressed", button.dataset.handle === handle?.name);
     }
     get("turns").hidden = !(handle?.turns && handle.moves);
     get("letgo").hidden = !handle;
     this.drawTurns();
+  }
+
+  drawPlace(matrix) {
+    this.places.forEach((input, k) => { if (document.activeElement !== input) input.value = (1e3 * matrix[12 + k]).toFixed(1); });
+  }
+
+  drag(name, matrix, final) {
+    this.drawPlace(matrix);
+    this.ask({ do: "drag", name, matrix, final });
+  }
+
+  // A place that is typed [mm].
+  put(input) {
+    const matrix = [...this.handles.chosen.matrix];
+    matrix[12 + Number(input.dataset.axis)] = Number(input.value) / 1e3;
+    if (input.value !== "") this.drag(this.handles.name, matrix, true);
   }
 
   drawTurns() {
@@ -261,16 +294,14 @@ class Live {
     page.setLayer("ghost", beside !== "");
   }
 
-  async export() {
-    const suffix = get("export").value;
+  async export(suffix) {
     get("export").value = "";
+    // Controllers of ABB move by the mass that they carry.
+    get("load").hidden = suffix !== ".mod";
     if (!suffix) return;
     this.say(`Writing ${suffix} …`);
-    const answer = await fetch(`/export?as=${suffix}&token=${encodeURIComponent(this.token)}`);
-    if (!answer.ok) {
-      this.say(await answer.text(), true);
-      return;
-    }
+    const answer = await fetch(`/export?as=${suffix}&mass=${get("mass").value}&token=${encodeURIComponent(this.token)}`);
+    if (!answer.ok) return this.say(await answer.text(), true);
     const name = decodeURIComponent(answer.headers.get("Content-Disposition").split("UTF-8''")[1]);
     offer(await answer.blob(), name);
     this.say(`Exported ${name}.`);

@@ -46,6 +46,12 @@ class Maps {
     this.map.seek(Math.max(time - seam.begin, 0));
   }
 
+  // What the map of the seam says of a time; of a move between seams nothing.
+  why(time) {
+    const { begin, slices } = this.seam, within = time - begin;
+    return within >= 0 && within <= slices[0].t.at(-1) + 1e-6 ? whyOnMap(this.map, within) : "";
+  }
+
   remove() { this.map.remove(); }
 }
 

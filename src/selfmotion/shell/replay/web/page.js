@@ -133,6 +133,7 @@ class Page {
     this.showPair(time);
     this.showStep(time);
     this.showLast(time);
+    get("why").textContent = `At ${time.toFixed(2)} s: ${whyThen(this, time)}`;
     if (!this.standing) this.jog?.show();
     for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], time);
   }

@@ -26,6 +26,8 @@ class Stage {
     this.content = content;
     this.viewer = new Viewer(element);
     this.turned = false;
+    // Points besides those of the motion that a view takes in.
+    this.also = () => [];
     this.marked = [];
     this.time = 0;
     new ResizeObserver(() => this.resize()).observe(element);
@@ -293,7 +295,7 @@ class Stage {
 
   // Stand just far enough away that the moving arm and its path fill the window.
   frame(direction = this.content.camera.direction) {
-    const { points } = this.content.camera;
+    const points = [...this.content.camera.points, ...this.also()];
     this.seen = undefined;
     const vector = (xyz) => new THREE.Vector3(...xyz);
     const toEye = vector(direction);

@@ -35,7 +35,7 @@ class Jog {
     const q = this.page.standing ?? this.at(this.page.now);
     this.inputs.forEach(({ input, output, unit }, k) => {
       if (document.activeElement !== input) input.value = q[k];
-      output.textContent = unit === "m" ? `${(1e3 * q[k]).toFixed(0)} mm` : `${((180 / Math.PI) * q[k]).toFixed(1)}°`;
+      output.textContent = spoken(q[k], unit);
     });
   }
 }
