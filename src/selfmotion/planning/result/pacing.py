@@ -18,7 +18,7 @@ from selfmotion.planning.result.pace_rows import (
 )
 
 # Smallest number of knots of a pace of constant joint speed …
-_MIN_KNOTS = 200
+_MIN_KNOTS = 600
 # … and about the largest.
 _ENOUGH = 3000
 # Parts of its first and last intervals.
