@@ -586,3 +586,14 @@ size = [0.1, 0.1, 1.2]
     again = tmp_path / "again.toml"
     sm.files.write_problem(sm.read_problem(file), again)
     assert distances(again) == expected
+
+
+def test_bodies_of_the_robot_have_no_distance_of_their_own(tmp_path: Path) -> None:
+    """It would have no effect."""
+    head = 'task = "position"\nstart = "dexterous"\n'
+    head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n'
+    text = '[robot]\nname = "panda"\n[[robot.bodies]]\nshape = "sphere"\nname = "camera"\n'
+    text += 'frame = "panda_hand"\nradius_mm = 20\n'
+    sm.read_problem(written(tmp_path, head + text))
+    with pytest.raises(sm.errors.FileFormatError, match="distance_mm: is of obstacles of a"):
+        sm.read_problem(written(tmp_path, head + text + "distance_mm = 20\n"))

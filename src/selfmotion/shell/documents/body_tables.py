@@ -13,7 +13,7 @@ from selfmotion.model.path import pose_of
 from selfmotion.model.task import SE3
 from selfmotion.shell.documents.field_types import File, Length, Lengths, Number, Text, key, needed
 from selfmotion.shell.documents.one_of import OneOf
-from selfmotion.shell.documents.tables import Context, Pose, PoseTable, Table
+from selfmotion.shell.documents.tables import Context, Pose, PoseTable, Table, refused
 
 _POSE = tuple(PoseTable.model_fields)
 
@@ -115,8 +115,21 @@ def _standing(body: Any) -> Any:
     return body
 
 
+def _without_distance(body: Any) -> Any:
+    """Return a body without a distance of its own, which those of clearances alone have."""
+    if body.distance is not None:
+        raise refused(
+            "distance",
+            body.distance,
+            "is of obstacles of a clearance or of the workpiece, expected none here: bodies of the "
+            "robot and what seams leave keep the distance of the clearance",
+        )
+    return body
+
+
 # What rides on something is in its frame by default; what stands in the world says where.
 AnyBody = Annotated[BodyTable, BODIES]
+CarriedBody = Annotated[BodyTable, BODIES, AfterValidator(_without_distance)]
 StandingBody = Annotated[BodyTable, BODIES, AfterValidator(_standing)]
 
 

@@ -14,7 +14,7 @@ from selfmotion.model.path import Feed, Path, with_run_ups
 from selfmotion.model.task import Task
 from selfmotion.problem.constraints import NO_OVERLAP, as_clearances, separate_clearances
 from selfmotion.problem.problem import KEPT
-from selfmotion.shell.documents.body_tables import AnyBody, WorkpieceTable
+from selfmotion.shell.documents.body_tables import CarriedBody, WorkpieceTable
 from selfmotion.shell.documents.field_types import (
     Checked,
     Flag,
@@ -75,7 +75,7 @@ class SeamKeys(PartTable):
     events: _Events = key(
         'What happens how long after its start [s], whichever way it is made: `["arc on", 0.1]`.'
     )
-    leaves: list[AnyBody] = key("Bodies that are there from then on.", [])
+    leaves: list[CarriedBody] = key("Bodies that are there from then on.", [])
     may_meet: SeveralNames = key(
         "Names of what others leave that it may meet, and the moves that lead to and from it."
     )

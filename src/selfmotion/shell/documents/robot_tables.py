@@ -22,7 +22,7 @@ from selfmotion.model.robot import (
     moving_joints,
     names_of,
 )
-from selfmotion.shell.documents.body_tables import AnyBody
+from selfmotion.shell.documents.body_tables import CarriedBody
 from selfmotion.shell.documents.field_types import (
     AnyTable,
     Coordinates,
@@ -118,7 +118,7 @@ class RobotTable(SourceTable):
         "`AMENT_PREFIX_PATH` and `ROS_PACKAGE_PATH`."
     )
     parts: dict[str, RobotPartTable] = key("Robots that make a cell, by name.")
-    bodies: list[AnyBody] = key("Bodies that links carry, each with the link as its frame.", [])
+    bodies: list[CarriedBody] = key("Bodies that links carry, each with the link as its frame.", [])
 
     def build(self, context: Context) -> RobotModel:
         """Return the arm, or the cell."""

@@ -102,8 +102,7 @@ def _in_si(written: str, value: Any, unit: float, own: Checked | None) -> Any:
         found = scaled(value, unit)
     except ValueError as error:
         raise refused(written, value, str(error)) from error
-    said = "" if own is None else _refusal(own, found)
-    if own is not None and said:
+    if own is not None and (said := _refusal(own, found)):
         raise refused(written, value, _refusal(own, value) or said)
     return found
 
