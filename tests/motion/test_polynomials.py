@@ -110,3 +110,12 @@ def test_pieces_are_evaluated_at_any_times() -> None:
         np.testing.assert_allclose(motion(times, order), expected, rtol=1e-13, atol=1e-13)
         assert motion(np.zeros(0), order).shape == (0, 2)
         np.testing.assert_array_equal(motion(float(times[3]), order), motion(times[3:4], order)[0])
+
+
+@pytest.mark.parametrize("lead", [1e-3, 1e-9, 1e-12, -1e-12])
+def test_roots_of_nearly_linear_parabolas_lose_no_digits(lead: float) -> None:
+    """The other root is far away: only a sum that does not cancel has this one."""
+    root = np.linspace(0.05, 0.95, 19)
+    constant = -root * (1.0 + lead * root)
+    found = inner_roots(np.stack([constant, np.ones(19), np.full(19, lead)]))
+    np.testing.assert_allclose(found.max(axis=0), root, rtol=1e-14)

@@ -98,7 +98,9 @@ def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
     if degree == 2:
         middle = -0.5 * monic[1]
         apart = np.sqrt(middle**2 - monic[0] + 0.0j)
-        return np.stack([middle - apart, middle + apart])
+        # The one farther from 0 loses no digits; their product is the constant term.
+        far = middle + np.where(middle < 0.0, -apart, apart)
+        return np.stack([far, monic[0] / np.where(far == 0.0, 1.0, far)])
     companion = np.zeros((count, degree, degree))
     companion[:, 1:, :-1] = np.eye(degree - 1)
     companion[:, :, -1] = -monic[:-1].T
