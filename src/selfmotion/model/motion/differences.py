@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, kernel
+from selfmotion.basics import Array, Ints, kernel, plain
 
 # Nodes in a stencil.
 _STENCIL = 5
@@ -32,12 +32,12 @@ class Differences:
         nearest = np.searchsorted(nodes, times) - width // 2
         self.first: Ints = np.clip(nearest, 0, len(nodes) - width)
         self.weights = np.zeros((3, len(times), width))
-        _set_weights(np.array(nodes), np.array(times), self.first, self.weights)
+        _set_weights(plain(nodes), plain(times), self.first, self.weights)
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
         """Return ẋ and ẍ at the times for values x (N + 1, n) at the nodes, (S, n) each."""
         found = np.zeros((2, len(self.first), x.shape[1]))
-        _add_differences(self.weights, self.first, np.array(x, order="C"), found)
+        _add_differences(self.weights, self.first, plain(x), found)
         first, second = found
         return first, second
 

@@ -260,12 +260,8 @@ class Trajectory:
                 within = self.t[first] + (self.t[first + 1] - self.t[first]) * roots[:, own]
                 found = inner[:, own].ravel()
                 for side, best in enumerate((found.argmin(), found.argmax())):
-                    # Rising above the largest, or falling below the least.
-                    if (
-                        (found[best] > values[1, joint])
-                        if side
-                        else (found[best] < values[0, joint])
-                    ):
+                    beyond = found[best] - values[side, joint]
+                    if beyond > 0.0 if side else beyond < 0.0:
                         values[side, joint], t[side, joint] = found[best], within.flat[best]
         return read_only(t), read_only(values)
 

@@ -75,15 +75,24 @@ def bad_meshes(urdf: Urdf, tag: str) -> tuple[BadMesh, ...]:
 
 def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
     """Return the SHA-256 of the mesh files of all ``<visual>`` or ``<collision>`` elements."""
-    places = (_place(urdf, file) for file in _mesh_names(urdf.text, tag))
-    return {str(place): digest_of_file(place) for place in places if place is not None}
+    return {str(place): digest_of_file(place) for place in _mesh_places(urdf, tag)}
 
 
-def mesh_stamps(urdf: Urdf, tag: str) -> tuple[tuple[str, int, int], ...]:
-    """Return paths, sizes and times of change [ns] of the same files."""
+def mesh_stamps(urdf: Urdf, tag: str) -> tuple[tuple[str, int, int, int, int], ...]:
+    """Return paths, numbers, sizes and times of change [ns] of the same files.
+
+    The time of the last change of a file's entry cannot be set back, as that of its content can.
+    """
+    stats = [(str(place), place.stat()) for place in _mesh_places(urdf, tag)]
+    return tuple(
+        (name, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)
+        for name, found in stats
+    )
+
+
+def _mesh_places(urdf: Urdf, tag: str) -> list[Path]:
     places = (_place(urdf, file) for file in _mesh_names(urdf.text, tag))
-    stats = [(str(place), place.stat()) for place in places if place is not None]
-    return tuple((name, found.st_size, found.st_mtime_ns) for name, found in stats)
+    return [place for place in places if place is not None]
 
 
 # Cached: reading the text takes as long as a seventh of a plan.

@@ -52,12 +52,13 @@ def inverse_kinematics(
     attempts = as_whole(attempts, "attempts", 1, 10**6, RobotError)
     lower, upper = robot.finite_limits()
     start = 0.5 * (lower + upper) if seed is None else robot.configuration(seed)
+    search = _Search(robot, pose, task)
     best = (np.inf, np.inf)
     for _ in range(attempts):
-        q, residual = _from_start(robot, pose, task, start)
+        q, residual = search.run(start)
         if residual[1] > _HALF_TURN:
             # It says in no direction where to turn; a little beside it does.
-            q, residual = _from_start(robot, pose, task, start + _BESIDE)
+            q, residual = search.run(start + _BESIDE)
         if max(residual) < _IK_TOLERANCE:
             return q
         best = min(best, residual, key=sum)
@@ -72,16 +73,21 @@ def inverse_kinematics(
     )
 
 
-def _from_start(
-    robot: RobotModel, pose: pin.SE3, task: Task, start: Array
-) -> tuple[Array, tuple[float, float]]:
-    """Return where the iteration from a start (n,) ends, and by how much the tool misses there."""
-    chain, lower, upper = robot.chain, np.array(robot.lower), np.array(robot.upper)
-    layout = layout_of([(task.rows, task.tool_axes, chain.joints)], robot.dof)
-    q = np.clip(start, lower, upper)
-    target = np.concatenate([pose.translation, pose.rotation.ravel()])
-    _levenberg_marquardt(q, np.array(chain.table)[None], target, layout, lower, upper)
-    return q, task.miss(pose, robot.pose(q))
+class _Search:
+    """Levenberg-Marquardt's method towards one pose, from several starts."""
+
+    def __init__(self, robot: RobotModel, pose: pin.SE3, task: Task) -> None:
+        self._robot, self._pose, self._task = robot, pose, task
+        self._limits = np.array(robot.lower), np.array(robot.upper)
+        self._chains = np.array(robot.chain.table)[None]
+        self._target = np.concatenate([pose.translation, pose.rotation.ravel()])
+        self._layout = layout_of([(task.rows, task.tool_axes, robot.chain.joints)], robot.dof)
+
+    def run(self, start: Array) -> tuple[Array, tuple[float, float]]:
+        """Return where it ends from a start (n,), and by how much the tool misses there."""
+        q = np.clip(start, *self._limits)
+        _levenberg_marquardt(q, self._chains, self._target, self._layout, *self._limits)
+        return q, self._task.miss(self._pose, self._robot.pose(q))
 
 
 @kernel

@@ -124,9 +124,7 @@ class Task(Enum):
 
 def align_axes(axis: Array, target: Array) -> Array:
     """Return the shortest rotation vector that takes unit vector `axis` to `target`, (3,) [rad]."""
-    (a, b, c), (x, y, z) = axis, target
-    # Of single vectors NumPy's own takes ten times as long.
-    cross = np.array([b * z - c * y, c * x - a * z, a * y - b * x])
+    cross = np.cross(axis, target)
     sine, cosine = float(np.linalg.norm(cross)), float(axis @ target)
     if sine == 0.0:
         if cosine > 0.0:

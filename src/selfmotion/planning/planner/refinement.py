@@ -115,7 +115,8 @@ class DividesAtNodes:
         Multipliers on the way say nothing. Where the optimum breaks something between its nodes,
         and what is on the way keeps it, that will do.
         """
-        if not polishes and is_kept(found.motion) and _mends(found.motion, known.motion):
+        breaks = broken_intervals(known.motion).any()
+        if not polishes and breaks and _keeps_between(found.motion):
             return found
         again = None if polishes else self._search.again(known)
         if again is not None and again.has_arrived:
@@ -126,9 +127,9 @@ class DividesAtNodes:
         return found if off else known
 
 
-def _mends(fine: NodeMotion, coarse: NodeMotion) -> bool:
-    """Whether a motion on more nodes keeps between them what one on fewer breaks there."""
-    return bool(broken_intervals(coarse).any() and not broken_intervals(fine).any())
+def _keeps_between(motion: NodeMotion) -> bool:
+    """Whether a motion keeps everything, between its nodes as well."""
+    return is_kept(motion) and not broken_intervals(motion).any()
 
 
 def _farther_apart(search: LocalSearch, known: NodeOutcome) -> NodeOutcome | None:
@@ -149,7 +150,7 @@ def _farther_apart(search: LocalSearch, known: NodeOutcome) -> NodeOutcome | Non
         stricter = grid.with_conditions(own._replace(points=points))
         optimum = search.minimise(stricter.at(centred(known.motion)))
         found = replace(optimum, motion=grid.at(centred(optimum.motion)))
-        if is_kept(found.motion) and not broken_intervals(found.motion).any():
+        if _keeps_between(found.motion):
             return search.outcome(found)
     return None
 

@@ -8,12 +8,12 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
-from selfmotion.certificate import Quantity
+from selfmotion.certificate import Quantity, errors_of_poses
 from selfmotion.model.collision import CollisionModel
 from selfmotion.model.follow import BoundTaskFrame, is_plain
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel, null_space
-from selfmotion.model.task import SE3, Task
+from selfmotion.model.task import Task
 from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
 from selfmotion.problem.problem import Problem
@@ -192,21 +192,11 @@ def curves(
     clock = clock_of(trajectory, times)
     q, qd, qdd = (trajectory(clock, order) for order in range(3))
     asked = torque_limits(plan)
-    target = follow.path.samples(clock)
     jacobians, turns, places = chain.along(q)
     _, frames, origins = world.along(q)
     rows = plan.problem.follows.jacobians(q)
     shapes = _velocity_ellipsoids(jacobians, task)
-    errors = np.array(
-        [
-            task.miss(SE3(*wanted), SE3(*reached))
-            for wanted, reached in zip(
-                zip(target.rotation, target.translation, strict=True),
-                zip(turns, places, strict=True),
-                strict=True,
-            )
-        ]
-    )
+    errors = errors_of_poses(follow, clock, turns, places, ())
     # The reference frame of what is followed, as it is carried along, in world axes.
     carrier = np.zeros((points, 4, 4))
     carrier[:, :3, :3] = frames @ base.rotation.T
