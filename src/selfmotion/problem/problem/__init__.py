@@ -21,6 +21,7 @@ from selfmotion.problem.problem.fit import (
     KEPT as KEPT,
     OF_MAKER as OF_MAKER,
     START_TOLERANCE as START_TOLERANCE,
+    USUAL_COSTS as USUAL_COSTS,
     check_feeds as check_feeds,
 )
 from selfmotion.problem.problem.knots import smooth_knots as smooth_knots

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from selfmotion.basics import ProblemError, SelfmotionError
@@ -53,7 +54,7 @@ class SeamJob:
                 remarks.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
         return (*self.notes, *remarks.values())
 
-    @property
+    @cached_property
     def problems(self) -> tuple[Problem, ...]:
         """The problem of each seam alone, without what others leave behind."""
         return tuple(map(self._problem, self.seams))

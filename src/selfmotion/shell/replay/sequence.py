@@ -217,12 +217,8 @@ class _ToolPath(Path, kind="_performed"):
     @override
     def evaluate(self, t: Array) -> PathSamples:
         times = np.minimum(self._motion.t[0] + t, self._motion.t[-1])
-        chain = self._robot.chain
-        placed = [chain.at(q) for q in self._motion(times)]
-        twists = np.array(
-            [at[0] @ qd for at, qd in zip(placed, self._motion(times, 1), strict=True)]
-        )
-        places, turns = (np.array([at[k] for at in placed]) for k in (2, 1))
+        jacobians, turns, places = self._robot.chain.along(self._motion(times))
+        twists = np.einsum("kcn,kn->kc", jacobians, self._motion(times, 1))
         return PathSamples(t, places, turns, twists)
 
 

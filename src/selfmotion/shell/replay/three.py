@@ -1,5 +1,6 @@
 """Shapes and commands for the viewer: meshcat and three.js objects as plain dictionaries."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -39,16 +40,17 @@ def tube(points: Array, radius: float, sides: int = 8) -> Surface:
     Vertex ``sides * k + j`` belongs to point k. The ring is carried along without twisting.
     """
     tangents = _tangents(points)
+    normals = np.empty_like(points)
     normal = np.eye(3)[np.argmin(np.abs(tangents[0]))]
-    angles = 2 * np.pi * np.arange(sides) / sides
-    rings = np.empty((len(points), sides, 3))
-    for k, (point, tangent) in enumerate(zip(points, tangents, strict=True)):
+    for k, tangent in enumerate(tangents):
         normal = normal - (normal @ tangent) * tangent
-        normal = normal / np.linalg.norm(normal)
-        across = np.cross(tangent, normal)
-        rings[k] = point + radius * (
-            np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * across
-        )
+        normal = normal / math.sqrt(normal @ normal)
+        normals[k] = normal
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rings = points[:, None] + radius * (
+        np.cos(angles)[:, None] * normals[:, None]
+        + np.sin(angles)[:, None] * np.cross(tangents, normals)[:, None]
+    )
     ring = np.arange(sides)
     start = sides * np.arange(len(points) - 1)[:, None]
     a, b = start + ring, start + np.roll(ring, -1)

@@ -148,8 +148,9 @@ class EditSession(PageSession):
             raise ProblemError(
                 f"{slider.name}: is {shown(value)}, expected {slider.low:g} to {slider.high:g}"
             )
-        self.edited.change({slider.keys: float(value)}, final=bool(request.get("final")))
-        self._request_plan()
+        final = bool(request.get("final"))
+        self.edited.change({slider.keys: float(value)}, final=final)
+        self._request_plan(is_held=not final)
 
     def _refuse(self, request: Mapping[str, Any], known: Mapping[str, Any]) -> NoReturn:
         name, names = shown(request.get("name")), ", ".join(known)

@@ -232,6 +232,9 @@ class Planning:
             yield from self._with_placements(
                 begun, problems, [near[job.seams[k].name] for k in kept]
             )
+            if request.is_held and not self._is_calm(request):
+                # A plan of several seams is only left between two of them: a hand does not wait.
+                raise NewerRequest
             self._leave(request)
             early = self._early(request, job, before)
             if early is not None:

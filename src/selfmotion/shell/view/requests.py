@@ -23,7 +23,7 @@ class Request:
     drag : (int, str) or None
         Of a handle that is chosen: the how manieth drag it is, and the handle's name.
     is_held : bool
-        Whether the handle is being dragged.
+        Whether a handle is being dragged, or a slider moved.
     """
 
     number: int

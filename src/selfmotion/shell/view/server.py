@@ -113,6 +113,8 @@ def configuration(app: "Starlette") -> Any:
         server_header=False,
         ws="websockets-sansio",
         ws_max_size=_LONGEST,
+        # To compress a message takes longer than to hand it to this machine's browser.
+        ws_per_message_deflate=False,
         timeout_graceful_shutdown=1,
     )
 

@@ -39,6 +39,7 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import (
+    USUAL_COSTS,
     Problem,
     arm_and_constraints,
     describe_arm,
@@ -133,15 +134,15 @@ def problem_of_seam(
         for item in clearances
         if item.obstacles or not any(each.keeps_as_far(item) for each in own)
     ]
-    problem = Problem(
+    return Problem(
         robot,
         seam.path,
         seam.task,
+        costs=USUAL_COSTS if seam.costs is None else tuple(seam.costs),
         constraints=(*constraints, *without_clearances(seam.constraints)),
         relaxations=tuple(seam.relaxations),
         clearance=(*own, *shared),
     )
-    return problem if seam.costs is None else replace(problem, costs=tuple(seam.costs))
 
 
 class Work:
