@@ -26,6 +26,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, Progress, series, silent
 from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path, PathSeries, path_series
 from selfmotion.model.robot import ChainSeries, RobotModel
 
 # Nodes of an interval are multiples of this: few numbers, of which each takes a pass of its own.
@@ -61,6 +62,8 @@ class MotionSegments:
         self.robot, self.trajectory, self.intervals = robot, trajectory, intervals
         self.middle = 0.5 * (intervals[:, 0] + intervals[:, 1])
         self.half = 0.5 * (intervals[:, 1] - intervals[:, 0])
+        # By the identity of paths, which need not be hashable.
+        self._path_series: dict[int, PathSeries | None] = {}
 
     @cached_property
     def _joints(self) -> Array:
@@ -71,9 +74,18 @@ class MotionSegments:
         joints = series.of_polynomial(self._joints).transpose(2, 0, 1)
         return ChainSeries(self.robot, joints, self.half)
 
+    def path_series(self, path: Path) -> PathSeries | None:
+        """Return the series of a path on all intervals, which is made once; None for unknown."""
+        if id(path) not in self._path_series:
+            self._path_series[id(path)] = path_series(path, self.middle, self.half)
+        return self._path_series[id(path)]
+
     def some(self, rows: Ints) -> "MotionSegments":
-        """Return some of the intervals."""
-        return MotionSegments(self.robot, self.trajectory, self.intervals[rows])
+        """Return some of the intervals, with what is known of them."""
+        found = MotionSegments(self.robot, self.trajectory, self.intervals[rows])
+        for key, known in self._path_series.items():
+            found._path_series[key] = known and PathSeries(*(item[:, rows] for item in known))
+        return found
 
     def times(self, u: Array) -> Array:
         """Return the times of places u (P,) of each interval, -1 to 1, (I, P)."""

@@ -199,7 +199,7 @@ class _Pace(BoundedFunction):
 
     @override
     def series(self, segments: MotionSegments) -> Array | None:
-        path = path_series(self._path, segments.middle, segments.half)
+        path = segments.path_series(self._path)
         if path is None:
             return None
         speed = series.derivative(path.translation, segments.half)
@@ -234,7 +234,7 @@ class _Along(BoundedFunction):
     def _room(self, segments: MotionSegments) -> Array:
         """Return the bounds of (v - v_d)·v_d on intervals, (I,) [m²/s²]."""
         slowest = np.full(len(segments.middle), self._pace.slowest)
-        path = path_series(self._follow.path, segments.middle, segments.half)
+        path = segments.path_series(self._follow.path)
         if path is not None:
             speed = series.derivative(path.translation, segments.half)
             middle = self._follow.path.samples(segments.middle).twist[:, :3]
@@ -244,7 +244,7 @@ class _Along(BoundedFunction):
 
     @override
     def series(self, segments: MotionSegments) -> Array | None:
-        path = path_series(self._follow.path, segments.middle, segments.half)
+        path = segments.path_series(self._follow.path)
         if path is None:
             return None
         place, _ = segments.chain().relative(self._follow.chain)

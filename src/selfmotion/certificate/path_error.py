@@ -12,7 +12,7 @@ from selfmotion.certificate.bounding import BoundedFunction, MotionSegments, bou
 from selfmotion.certificate.requirement import Extreme, Tolerance
 from selfmotion.model.follow import BoundTaskFrame, Follows
 from selfmotion.model.motion import Trajectory
-from selfmotion.model.path import Path, path_series
+from selfmotion.model.path import Path
 from selfmotion.model.robot import WORLD, Chain, RobotModel
 from selfmotion.model.task import Relaxation, Task
 
@@ -345,7 +345,7 @@ class _PathErrors(BoundedFunction):
 
     @override
     def series(self, segments: MotionSegments) -> Array | None:
-        path = path_series(self._path, segments.middle, segments.half)
+        path = segments.path_series(self._path)
         if path is None:
             return None
         place, turn = segments.chain().relative(self._chain)
