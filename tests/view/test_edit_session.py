@@ -252,6 +252,24 @@ def test_a_verified_plan_is_exported(page, tmp_path):
     last(page)
 
 
+def test_controllers_that_have_no_such_arm_are_not_offered(page):
+    """A Panda has seven joints in the arm itself: neither UR nor KUKA has programs for it."""
+    last(page)
+    offered = set(page.session.exports)
+    assert {".npz", ".csv", ".yaml", ".mod"} <= offered
+    assert not {".script", ".src"} & offered
+
+
+def test_controllers_that_have_such_an_arm_are_offered(tmp_path):
+    file = tmp_path / "line.toml"
+    text = CIRCLE.replace("panda", "ur10").replace("[0.5, 0, 0.5]", "[0.7, 0.2, 0.4]")
+        "[0.5, 0, 0.5]", "[0.7, 0.2, 0.4]"
+    )
+    file.write_text(text)
+    with opened(file) as session:
+        assert {".script", ".src", ".mod"} <= set(session.exports)
+
+
 def test_one_page_at_a_time(page):
     assert not page.session.attach(lambda _: None)
 

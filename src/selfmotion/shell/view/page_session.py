@@ -8,11 +8,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from selfmotion.basics import FileFormatError, PlanError, ProblemError
+from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Parts, Plan, load_plan
 from selfmotion.shell.replay import Json, PlanReplay, live_html
 from selfmotion.shell.view.requests import Outcome
 from selfmotion.shell.view.shown import Shown
-from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, write_motion
+from selfmotion.shop.controllers import PROGRAMS, ProgramSettings, check_arm, write_motion
 
 # Files that motions are exported to, by suffix, and how the page calls them.
 _OF_MOTIONS = {
@@ -27,6 +28,8 @@ _OF_MOTIONS = {
 _OF_PLANS = {".npz": "plan (.npz)", **_OF_MOTIONS}
 _OF_PROGRAMS = {".program": "program (.program)", **_OF_MOTIONS}
 _OF_PARTS = {".parts": "parts (.parts)", **_OF_MOTIONS}
+# Those that only some arms have.
+_CONTROLLERS = {".script": "urscript", **PROGRAMS}
 # Files that are read again with all that they hold.
 _OWN = (".npz", ".program", ".parts")
 
@@ -85,12 +88,27 @@ class PageSession:
     def exports(self) -> dict[str, str]:
         """Files that the motion can be exported to: their suffixes, and how they are called."""
         outcome = self._found
-        if outcome is None or outcome.replayed is None or isinstance(outcome.replayed, PlanReplay):
+        if outcome is None or outcome.plan is None:
             return _OF_PLANS
-        if outcome.made is None and not self.saves:
+        if isinstance(outcome.replayed, PlanReplay):
+            files = _OF_PLANS
+        elif outcome.made is None and not self.saves:
             # A motion of a controller's own program is there already.
-            return {}
-        return _OF_PARTS if isinstance(outcome.made, Parts) else _OF_PROGRAMS
+            files = {}
+        else:
+            files = _OF_PARTS if isinstance(outcome.made, Parts) else _OF_PROGRAMS
+        robot = outcome.plan.robot
+        return {key: name for key, name in files.items() if self._has_programs(robot, key)}
+
+    def _has_programs(self, robot: RobotModel, suffix: str) -> bool:
+        """Return whether files of a suffix are for such an arm."""
+        if suffix not in _CONTROLLERS:
+            return True
+        try:
+            check_arm(robot, _CONTROLLERS[suffix], self.settings or ProgramSettings())
+        except ProblemError:
+            return False
+        return True
 
     def close(self) -> None:
         """End what works for the page."""
@@ -212,7 +230,7 @@ class PageSession:
         if not outcome.verified or outcome.plan is None:
             raise PlanError(f"{outcome.words}; nothing is exported until it is verified")
         settings = None
-        if suffix in (".script", *PROGRAMS):
+        if suffix in _CONTROLLERS:
             settings = self.settings or ProgramSettings()
             settings = settings if mass is None else replace(settings, mass=mass)
         if suffix == ".mod" and settings is not None and settings.mass is None:

@@ -1,5 +1,9 @@
 """Joint motions for controllers and simulators, written, read back and judged."""
 
+from selfmotion.shop.controllers.controller_arms import (
+    check_arm as check_arm,
+    check_controller as check_controller,
+)
 from selfmotion.shop.controllers.controller_program import ControllerProgram as ControllerProgram
 from selfmotion.shop.controllers.mimic_joints import (
     mimic_joints as mimic_joints,
@@ -19,10 +23,7 @@ from selfmotion.shop.controllers.part_motions import (
     read_parts as read_parts,
     write_parts as write_parts,
 )
-from selfmotion.shop.controllers.program_draft import (
-    check_controller as check_controller,
-    check_signals as check_signals,
-)
+from selfmotion.shop.controllers.program_draft import check_signals as check_signals
 from selfmotion.shop.controllers.program_facts import held_in_words as held_in_words
 from selfmotion.shop.controllers.program_files import (
     PROGRAMS as PROGRAMS,

@@ -14,6 +14,7 @@ from selfmotion.basics import (
 )
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.result import Plan
+from selfmotion.shop.controllers.controller_arms import check_joints
 from selfmotion.shop.controllers.motions import (
     STREAM,
     WRITERS,
@@ -26,7 +27,6 @@ from selfmotion.shop.controllers.samples import (
     check_ends,
     within_limits_at,
 )
-from selfmotion.shop.controllers.urscript import check_joints
 
 
 def write_parts(

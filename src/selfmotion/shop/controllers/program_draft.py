@@ -14,6 +14,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.problem.constraints import Constraint
+from selfmotion.shop.controllers.controller_arms import check_controller
 from selfmotion.shop.controllers.controller_axes import axes_of, in_order, tool_from_flange
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.deviations import Deviations
@@ -31,7 +32,7 @@ from selfmotion.shop.controllers.targets import (
     segments_of,
 )
 from selfmotion.shop.controllers.thinning import Section
-from selfmotion.shop.controllers.tool_frames import ToolFrames, axis_inside_arm
+from selfmotion.shop.controllers.tool_frames import ToolFrames
 from selfmotion.shop.controllers.work_objects import frame_of_paths
 from selfmotion.work.job import Program, are_opposite
 
@@ -157,29 +158,6 @@ def _but_of_moves(
     if operation.is_move:
         raise NotByPosesError(why)
     return posed(operation, slides, first, last)
-
-
-def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:
-    """Refuse what a controller has no program for, or what its program has to say and does not.
-
-    Raises
-    ------
-    ProblemError
-        An arm of seven joints as KRL, or no mass for a controller of ABB.
-    """
-    if form == "rapid" and settings.mass is None:
-        raise ProblemError(
-            f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
-            f"of ABB moves by it; give export --set mass=KG, or mass in the file of --settings "
-            f"(ProgramSettings(mass=…))"
-        )
-    joint = axis_inside_arm(robot, axes_of(robot, settings)) if form == "krl" else ""
-    if joint:
-        raise ProblemError(
-            f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "
-            f"external ones, and KUKA's arms of seven (LBR iiwa) are programmed in Java (Sunrise); "
-            f"write .yaml (ROS 2) or .csv for the driver of such an arm"
-        )
 
 
 def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
+from selfmotion.shop.controllers.controller_arms import check_joints
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
 from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, urscript_numbers, urscript_pose
 from selfmotion.shop.controllers.pose_segments import PoseSegment
@@ -153,18 +154,6 @@ URSCRIPT = Language(
         Statement("leave", "end", _BODY, then="after"),
     ),
 )
-
-
-def check_joints(robot: RobotModel, joints: Sequence[str], what: str = "") -> None:
-    """Refuse joints, of the robot or of `what`, that are not those of an arm of UR."""
-    slides = [name for name in joints if robot.is_prismatic(name)]
-    if len(joints) != _JOINTS or slides:
-        raise ProblemError(
-            f"{what or robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one "
-            f"has {len(joints)} joints"
-            + (f", of which '{slides[0]}' slides" if slides else "")
-            + "; tables (.csv) and ROS 2 messages (.yaml) are for any joints"
-        )
 
 
 def joint_approach(q: Array, settings: ProgramSettings) -> str:

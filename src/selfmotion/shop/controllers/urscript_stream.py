@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 from selfmotion.basics import Array
 from selfmotion.model.robot import RobotModel
+from selfmotion.shop.controllers.controller_arms import check_joints
 from selfmotion.shop.controllers.controller_axes import tool_from_flange
 from selfmotion.shop.controllers.program_facts import held_in_words
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.program_texts import as_word, plain
 from selfmotion.shop.controllers.program_writer import event_text
-from selfmotion.shop.controllers.urscript import URSCRIPT, check_joints, joint_approach, payload
+from selfmotion.shop.controllers.urscript import URSCRIPT, joint_approach, payload
 
 # After Universal Robots' script manual (e-Series, 5.11): ``set_tcp`` is the tool's pose in the
 # flange as position [m] and rotation vector [rad], ``movej`` goes to the start at a joint speed
