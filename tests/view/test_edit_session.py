@@ -263,8 +263,6 @@ def test_controllers_that_have_no_such_arm_are_not_offered(page):
 def test_controllers_that_have_such_an_arm_are_offered(tmp_path):
     file = tmp_path / "line.toml"
     text = CIRCLE.replace("panda", "ur10").replace("[0.5, 0, 0.5]", "[0.7, 0.2, 0.4]")
-        "[0.5, 0, 0.5]", "[0.7, 0.2, 0.4]"
-    )
     file.write_text(text)
     with opened(file) as session:
         assert {".script", ".src", ".mod"} <= set(session.exports)
