@@ -25,6 +25,8 @@ RESTS = 1e-9
 WITHIN = 0.01
 
 
+# Speeds are the same up to rounding within this share.
+SAME = 1e-9
 ACCELERATION, TURN_ACCELERATION, SMOOTHING = 2.0, 20.0, 0.04
 
 
@@ -245,7 +247,8 @@ def test_feeds_of_stretches_are_kept_and_judged_each_by_itself() -> None:
     kept = {item.asked: item for item in short.feeds}
     assert kept[0.05].kept
     assert not kept[1.0].kept
-    assert 0.05 < kept[1.0].slowest < 0.5
+    # A bound half a window before and after leaves it the feed beside it.
+    assert 0.05 * (1.0 - SAME) <= kept[1.0].slowest < 0.5
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,8 @@ class FeedReached(Requirement):
         slowest, fastest = found.asked, 0.0
         for first, last, is_counted in _runs(intervals, counts):
             within = _Pace(found.path, low if is_counted else -high, high)
-            edges = np.union1d(intervals[first : last + 1].ravel(), _marks(found, first, last))
+            ends = intervals[first, 0], intervals[last, 1]
+            edges = np.union1d(ends, _marks(found, first, last))
             known = bounded(within, motion.robot, motion.trajectory, edges)
             # A motion may be so near to its limit that halving does not decide.
             if _is_off(known):

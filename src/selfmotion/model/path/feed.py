@@ -152,7 +152,7 @@ class Feed(_Derived, kind="feed"):
     def marks(self) -> Array:
         inner = [pace.t + start for start, _, pace in self._paces]
         # Length over time, and time over length, are splines.
-        inner.append(self._moved(np.union1d(self._path.marks, self._nodes.sigma)))
+        inner.append(self._moved(np.union1d(self._path.marks, self._nodes.breaks)))
         return _separate(np.concatenate(inner), self.duration)
 
     def _moved(self, wanted: Array) -> Array:

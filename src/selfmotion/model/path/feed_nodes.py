@@ -195,7 +195,17 @@ class FeedNodes:
         """The original's time as a function of the length."""
         from scipy.interpolate import CubicHermiteSpline
 
-        return CubicHermiteSpline(self._lengths, self.sigma, self._spaced[1])
+        along = self._along_length
+        return CubicHermiteSpline(along.t, along.sigma, along.rate)
+
+    @property
+    def breaks(self) -> Array:
+        """The original's times between which it is one polynomial of the length."""
+        return self._along_length.sigma
+
+    @cached_property
+    def _along_length(self) -> Pace:
+        return Pace(self._lengths, self.sigma, self._spaced[1]).simplified()
 
     @cached_property
     def _bends(self) -> Array:

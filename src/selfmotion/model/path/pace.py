@@ -3,11 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, series
+from selfmotion.basics import Array, Flags, Ints, series
 
 # Samples within this share of a window are merged: more would add rounding to the jerk.
 _CLOSE = 0.1
@@ -17,6 +18,9 @@ _SAME = 1e-4
 _FALL = 1e-6
 # … at this number of places of an interval.
 _PLACES = 33
+# Samples lie on the polynomial between their neighbours if its value, first and second derivative
+# differ by no more than these shares of the largest ones: what rounding does to 1,000 samples.
+_ON_IT = 1e-12, 1e-9, 1e-6
 # Bisections of the time at which σ has a value.
 _HALVINGS = 52
 
@@ -58,7 +62,63 @@ class Pace:
         has all.
         """
         thinned = self._mean(window, _CLOSE)
-        return thinned if thinned.falls_at() is None else self._mean(window, _SAME)
+        thinned = thinned if thinned.falls_at() is None else self._mean(window, _SAME)
+        simplified = thinned.simplified()
+        return simplified if simplified.falls_at() is None else thinned
+
+    def simplified(self) -> "Pace":
+        """Return the same without the samples that lie on the polynomial between two others."""
+        kept = [0]
+        for first, last in pairwise(self._breaks):
+            kept += self._needed(first, last)
+        return self._some(kept)
+
+    @property
+    def _breaks(self) -> list[int]:
+        """Samples at which the polynomial may become another one; both ends."""
+        span = self.t[2:] - self.t[:-2]
+        # Of two intervals the longer one's polynomial goes on into the other with less rounding.
+        met = self._is_met(slice(None, -1), span, slice(2, None))
+        met |= self._is_met(slice(1, None), self.t[:-2] - self.t[1:-1], slice(None, -2))
+        return [0, *(np.flatnonzero(~met) + 1).tolist(), len(self.t) - 1]
+
+    def _is_met(self, pieces: slice, later: Array, samples: slice) -> Flags:
+        """Return whether polynomials, so much later than they begin, meet samples, (K - 2,)."""
+        coefficients = self._spline.c[:, pieces]
+        met = np.ones(len(later), dtype=bool)
+        for share, known in zip(_ON_IT, self._known, strict=False):
+            found = coefficients[0].copy()
+            for each in coefficients[1:]:
+                found = found * later + each
+            met &= np.abs(found - known[samples]) <= share * np.abs(known).max()
+            powers = np.arange(len(coefficients) - 1.0, 0.0, -1.0)
+            coefficients = coefficients[:-1] * powers[:, None]
+        return met
+
+    def _needed(self, first: int, last: int) -> list[int]:
+        """Return the samples after the first that this interval needs, up to the last."""
+        if last - first < 2 or self._is_one(first, last):
+            return [last]
+        middle = (first + last) // 2
+        return [*self._needed(first, middle), *self._needed(middle, last)]
+
+    def _is_one(self, first: int, last: int) -> bool:
+        """Return whether the samples between two lie on the polynomial between them."""
+        inner, between = slice(first + 1, last), self._some([first, last])
+        return all(
+            np.abs(between(self.t[inner], order) - known[inner]).max()
+            <= share * np.abs(known).max()
+            for order, (share, known) in enumerate(zip(_ON_IT, self._known, strict=False))
+        )
+
+    @property
+    def _known(self) -> tuple[Array, ...]:
+        """σ, its rate, and its second derivative where that is known, (K,) each."""
+        return (self.sigma, self.rate, *(() if self.bend is None else (self.bend,)))
+
+    def _some(self, rows: list[int]) -> "Pace":
+        bend = None if self.bend is None else self.bend[rows]
+        return Pace(self.t[rows], self.sigma[rows], self.rate[rows], bend)
 
     def _mean(self, window: float, close: float) -> "Pace":
         """Return the mean over a window, by samples no closer than this share of it."""
