@@ -18,9 +18,9 @@ from selfmotion.basics import public_name
 from support.doors import of, offered
 
 
-def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
+def test_plans_leave_the_heavy_and_optional_packages_alone() -> None:
     code = (
-        "import sys, selfmotion; "
+        "import sys, selfmotion as sm; sm.plan, sm.load_robot, sm.Problem, sm.plan_job; "
         "print([name for name in ('meshcat', 'matplotlib', 'trimesh', 'yourdfpy', "
         "'typer', 'rich', 'scipy.integrate', 'scipy.interpolate', 'scipy.spatial', "
         "'pydantic', 'tomli_w', 'xacro', 'distributed') "
@@ -60,6 +60,13 @@ def test_the_top_level_is_short_and_nothing_is_there_twice() -> None:
     spaced = [name.split(".")[1] for name in offered(sm) if "." in name]
     assert not set(spaced) & set(sm.__all__)
     assert len(set(spaced)) == len(spaced)
+
+
+def test_the_import_takes_no_library_with_it() -> None:
+    """What a script does not use is not imported: numba and Pinocchio take half a second."""
+    code = "import selfmotion, sys; print({'numpy', 'numba', 'pinocchio'} & sys.modules.keys())"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "set()"
 
 
 # `sm.X` or `selfmotion.x.X`, and such a beginning before what an f-string puts in.

@@ -36,6 +36,7 @@ from selfmotion.planning.result.plan import (
     Views as Views,
     load_plan as load_plan,
     reached_text as reached_text,
+    views as views,
 )
 from selfmotion.planning.result.report import Attempt as Attempt, Gap as Gap, Report as Report
 from selfmotion.planning.result.retiming import (

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.metadata import entry_points
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy.typing as npt
 
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
 
 
 class Views(Protocol):
-    """Views of plans, registered by the replay: it depends on plans."""
+    """Views of plans, which the replay makes: it depends on plans."""
 
     def notebook_html(self, plan: Plan) -> str:
         """Return the replay as HTML for a notebook."""
@@ -79,6 +80,14 @@ class Views(Protocol):
 
     def write_replay(self, plan: Plan, file: FilePath) -> None:
         """Write the replay as a page."""
+
+
+@cache
+def views() -> Views:
+    """Return what makes views of plans: the package's entry point of this name."""
+    (entry,) = entry_points(group="selfmotion_views", name="replay")
+    found: Views = entry.load()
+    return found
 
 
 def _digests(costs: Sequence[Cost]) -> dict[str, str]:
@@ -125,8 +134,6 @@ class Plan:
     altered : str
         Why the file that it was read from is not the one that was written; "" where it is.
     """
-
-    views: ClassVar[Views | None] = None
 
     problem: Problem
     trajectory: Trajectory
@@ -395,13 +402,11 @@ class Plan:
 
         Needs matplotlib (``pip install 'selfmotion[plots]'``).
         """
-        if self.views is None:
-            raise PlanError("figures are made by the whole package: import selfmotion")
-        return self.views.figure(self)
+        return views().figure(self)
 
-    def _repr_html_(self) -> str | None:
+    def _repr_html_(self) -> str:
         """Show the replay inline in a notebook."""
-        return None if self.views is None else self.views.notebook_html(self)
+        return views().notebook_html(self)
 
 
 def _own_report(plan: Plan) -> Report:

@@ -16,7 +16,14 @@ from selfmotion.basics import SelfmotionError, digest_of_file, write_bytes, writ
 from selfmotion.certificate import USUAL
 from selfmotion.model.path import Path as ToolPath, Retimed
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.planning.result import MotionSpecification, Plan, load_plan, read_kept, write_kept
+from selfmotion.planning.result import (
+    MotionSpecification,
+    Plan,
+    load_plan,
+    read_kept,
+    views,
+    write_kept,
+)
 from selfmotion.problem.problem import Problem, along_other_paths
 from selfmotion.work.batch.items import LATE, Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
@@ -149,8 +156,8 @@ class Folder:
         file = self.path / "replays" / f"{row.name}.html"
         # A plan that was planned again is newer than its replay.
         sound = file.is_file() and file.stat().st_mtime >= row.file.stat().st_mtime
-        if not sound and wanted and Plan.views is not None:
-            Plan.views.write_replay(row.plan(), file)
+        if not sound and wanted:
+            views().write_replay(row.plan(), file)
             sound = True
         return file.relative_to(self.path).as_posix() if sound else ""
 

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-from selfmotion.basics.moved import MOVED, MOVED_MODULES
+from selfmotion.moved import MOVED, MOVED_MODULES
 
 
 @pytest.mark.parametrize("old", sorted(set(MOVED) - {"problem", "planning", "paper"}))
