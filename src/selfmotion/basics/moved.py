@@ -50,6 +50,7 @@ MOVED_MODULES = {
     "shop.controllers.read_stretches": "shop.controllers.segment_building",
     "shop.controllers.stretches": "shop.controllers.segments",
     "shop.sheet": "shell.sheet",
+    "work.job.kernels": "work.job.two_opt",
     "work.placement.corners": "work.placement.correction_range",
 }
 
