@@ -44,6 +44,7 @@ MOVED_MODULES = {
     "problem.problem.augmented": "planning.formulation.formulation",
     "problem.problem.of_arm": "planning.formulation.tolerances",
     "realtime.clear": "realtime.moving_clearance",
+    "shell.cli.reread": "shell.cli.file_verification",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
     "shop.controllers.commented_lines": "shop.controllers.program_lines",
     "shop.controllers.read_segments": "shop.controllers.segment_building",
