@@ -108,8 +108,8 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
     with_unit = set[str]()
 
-    def normalised(title: str) -> str:
-        """Return the column's name for a title, and record titles that state a unit."""
+    def read_title(title: str) -> str:
+        """Return the name of a column for its title; record those whose title states a unit."""
         name = column_name(title)
         if "[" in title or "(" in title:
             with_unit.add(name)
@@ -120,7 +120,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
         (SEAM, EVENT),
         check=lambda names: [_si_column(file, name) for name in _kuka_titles(names)],
         columns=None if reading is None else reading.columns,
-        named=normalised,
+        named=read_title,
         usual=_DEFAULT_HEADERS,
     )
     labels = [f"line {number}" for number in lines]
@@ -155,7 +155,7 @@ def rows_of_table(
     if (titles := _kuka_titles(header)) != list(header):
         _check_millimetres(file, header, table)
         header, notes = titles, (_KUKA_NOTE,)
-    columns = _columns(file, header, table)
+    columns = _si_columns(file, header, table)
     notes += _units_note([title for title in header if title not in with_unit])
     events = texts.get(EVENT, [""] * len(labels))
     missing = [name for name in _POSITION if name not in columns]
@@ -181,7 +181,7 @@ def rows_of_table(
 def _orientations(
     file: FilePath, header: Sequence[str], columns: Mapping[str, Array], labels: Sequence[str]
 ) -> tuple[str, Array, tuple[str, ...]]:
-    """Return which key of `ORIENTATIONS` a table has, "" for none, its values, and notes on it."""
+    """Return the key of an orientation in `ORIENTATIONS` ("" for none), its values, and notes."""
     present = [names for names in _ORIENTATIONS if set(names) & set(columns)]
     if len(present) > 1:
         raise FileFormatError(
@@ -207,34 +207,34 @@ def _orientations(
 
 
 def _units_note(titles: Sequence[str]) -> tuple[str, ...]:
-    """Return a note of columns that say no unit, and of what they are taken for."""
-    bare: dict[tuple[str, str], list[str]] = {}
+    """Return a note on the columns without a unit, with the unit that is assumed."""
+    without_unit: dict[tuple[str, str], list[str]] = {}
     for title in titles:
         if column_name(title) in _DEFAULT_UNITS:
-            bare.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(column_name(title))
-    if not bare:
+            without_unit.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(
+                column_name(title)
+            )
+    if not without_unit:
         return ()
     columns = "; ".join(
         f"{','.join(names)} for {taken}{f' (else: {others})' if others else ''}"
-        for (taken, others), names in bare.items()
+        for (taken, others), names in without_unit.items()
     )
     return (f"columns say no unit and are taken so: {columns}",)
 
 
 def _kuka_titles(titles: Sequence[str]) -> list[str]:
-    """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
-    given = [column_name(title) for title in titles]
-    return (
-        [_KUKA_TITLES.get(name, name) for name in given]
-        if {"a", "b", "c"} <= set(given)
-        else [*titles]
-    )
+    """Return titles; where A, B and C of KUKA are among them, the names that columns have here."""
+    names = [column_name(title) for title in titles]
+    if {"a", "b", "c"} <= set(names):
+        return [_KUKA_TITLES.get(name, name) for name in names]
+    return [*titles]
 
 
 def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
-    """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
-    bare = [k for k, title in enumerate(titles) if column_name(title) in _POSITION]
-    if bare and len(table) and np.abs(table[:, bare]).max() < _MAX_METRES:
+    """Refuse positions beside A, B, C without a unit that are so small that they may be metres."""
+    without_unit = [k for k, title in enumerate(titles) if column_name(title) in _POSITION]
+    if without_unit and len(table) and np.abs(table[:, without_unit]).max() < _MAX_METRES:
         raise FileFormatError(
             f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
             f"{_MAX_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
@@ -245,7 +245,7 @@ def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> N
 def _check_rotation_vectors(
     file: FilePath, turns: Array, labels: Sequence[str], angles: str
 ) -> None:
-    """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
+    """Refuse rotation vectors (K, 3) [rad] above half a turn: they may be roll, pitch and yaw."""
     sizes = np.linalg.norm(turns, axis=1)
     # Degrees that are taken for radians are reported as such later on.
     over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
@@ -260,11 +260,11 @@ def _check_rotation_vectors(
 
 
 def column_name(title: str) -> str:
-    """Return a title as its column is called here: x_mm of "X [mm]"."""
+    """Return the name of a column for its title: x_mm for "X [mm]"."""
     name = title.strip().lower()
-    found = _TITLE_WITH_UNIT.fullmatch(name)
-    if found and found[2].strip() in _BRACKETS:
-        name = found[1] + _BRACKETS[found[2].strip()]
+    match = _TITLE_WITH_UNIT.fullmatch(name)
+    if match and match[2].strip() in _BRACKETS:
+        name = match[1] + _BRACKETS[match[2].strip()]
     stem, unit = name, ""
     for suffix in _UNITS:
         if name.endswith(suffix):
@@ -281,8 +281,8 @@ def _split_events(text: str) -> list[str]:
     return [event.strip() for event in text.split(";") if event.strip()]
 
 
-def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
-    """Return the columns in SI units, by their names without unit."""
+def _si_columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without units."""
     columns: dict[str, Array] = {}
     for k, title in enumerate(header):
         name, scale = _si_column(file, title)
@@ -293,7 +293,7 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
 
 
 def _si_column(file: FilePath, title: str) -> tuple[str, float]:
-    """Return the name of a column without its unit, and that in SI units."""
+    """Return the name of a column without its unit, and the factor to SI units."""
     title = column_name(title)
     name, scale = title, 1.0
     for suffix, (names, factor) in _UNITS.items():
@@ -348,6 +348,6 @@ def read_array(file: FilePath, reading: Reading) -> PoseRows:
             f"{file}: has shape {array.shape} and {count} are named, expected (N, 4, 4) poses, "
             f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
         )
-    chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
-    numbers = array[:, chosen] * 1.0
-    return rows_of_table(file, [columns[k] for k in chosen], numbers, labels, {})
+    used = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, used] * 1.0
+    return rows_of_table(file, [columns[k] for k in used], numbers, labels, {})
