@@ -43,12 +43,15 @@ MOVED_MODULES = {
     "planning.transfer.ways": "planning.transfer.rrt_connect",
     "problem.problem.augmented": "planning.formulation.formulation",
     "problem.problem.of_arm": "planning.formulation.tolerances",
+    "realtime.clear": "realtime.moving_clearance",
+    "shell.cli.reread": "shell.cli.file_verification",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
     "shop.controllers.commented_lines": "shop.controllers.program_lines",
     "shop.controllers.read_segments": "shop.controllers.segment_building",
     "shop.controllers.read_stretches": "shop.controllers.segment_building",
     "shop.controllers.stretches": "shop.controllers.segments",
     "shop.sheet": "shell.sheet",
+    "work.job.kernels": "work.job.two_opt",
     "work.placement.corners": "work.placement.correction_range",
 }
 

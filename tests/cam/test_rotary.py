@@ -28,7 +28,7 @@ def test_chords_miss_a_line_by_no_more_than_allowed_and_are_few(
 ) -> None:
     table = Rotary(TABLE, (("C", 1.0),), CENTER)
     first, last = CENTER + start, CENTER + goal
-    count = table.count(first, last, {"C": 0.0}, {"C": turn})
+    count = table.chord_count(first, last, {"C": 0.0}, {"C": turn})
     assert count > 1
 
     def missed(chords: int) -> float:
@@ -43,7 +43,7 @@ def test_chords_miss_a_line_by_no_more_than_allowed_and_are_few(
 
 
 def test_where_the_head_turns_a_line_is_one() -> None:
-    assert Rotary(HEAD).count(np.zeros(3), np.ones(3), {"C": 0.0}, {"C": 1.0}) == 1
+    assert Rotary(HEAD).chord_count(np.zeros(3), np.ones(3), {"C": 0.0}, {"C": 1.0}) == 1
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import Separation
-from selfmotion.shell.cli import reread
+from selfmotion.shell.cli import file_verification
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import judge_program, program_deviation, read_program
 from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
@@ -681,17 +681,17 @@ def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
 ) -> None:
     file = tmp_path / "weld.src"
     sm.files.write_motion(program, file, settings=settings("weld.src", 1e-3))
-    assert reread._confirmed(program, file)[0]
+    assert file_verification._verify_program(program, file).verified
     count, stated, found = program_deviation(program, file)
     for k in range(3):
         path = list(found.path)
         path[k] = stated.path[k] + 1e-8
         off = count, stated, found._replace(path=type(found.path)(*path))
         monkeypatch.setattr(controllers, "program_deviation", lambda *_, off=off: off)
-        assert not reread._confirmed(program, file)[0]
+        assert not file_verification._verify_program(program, file).verified
     monkeypatch.undo()
     file.write_text(file.read_text().replace("= FALSE", "= TRUE"))
-    kept, said = reread._confirmed(program, file)
+    kept, said = file_verification._verify_program(program, file)
     assert not kept
     assert "both switch '7' to True" in said
 

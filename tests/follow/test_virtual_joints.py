@@ -366,7 +366,7 @@ def test_gradients_along_nodes_equal_central_differences(
     size = 1e-5
     here = centred(here)
     aims = [moved(here, side * direction).objective for side in (size, -size)]
-    force = here.grid.spline.scattered(slopes_of(here))
+    force = here.grid.spline.scatter(slopes_of(here))
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()

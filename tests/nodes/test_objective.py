@@ -34,7 +34,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
 
 def force_of(motion):
     """Return λ = ∂F/∂(q, q̇, q̈) of the nodes."""
-    return motion.grid.spline.scattered(slopes_of(motion))
+    return motion.grid.spline.scatter(slopes_of(motion))
 
 
 def gradient(motion):

@@ -15,7 +15,7 @@ from selfmotion.planning.nodes.spline import (
     POINTS,
     Quintic,
     control_times,
-    point_shares,
+    point_matrices,
     unit_bases,
 )
 
@@ -52,7 +52,7 @@ def test_the_curve_goes_through_its_nodes_as_a_quintic(order: int, shares: Array
     expected = curve(spline.points.t)
     near(spline.at_points(order, ends), expected)
     which = np.array([len(expected) - 1, 3, 0, 4])
-    k, tables = point_shares(spline, which)
+    k, tables = point_matrices(spline, which)
     near((tables[:, order, None] @ ends[k])[:, 0], expected[which])
     with pytest.raises(AssertionError):
         near((tables[:, order, None] @ ends[k[::-1]])[:, 0], expected[which])
@@ -93,7 +93,7 @@ def test_what_is_pulled_back_is_the_adjoint_of_the_ends(copies: int) -> None:
     inner = np.delete(np.arange(spline.count), spline.gaps)
     by_ends = np.random.default_rng(2).normal(size=ends.shape)
     one = np.sum(by_ends[inner] * ends[inner])
-    assert np.sum(spline.scattered(by_ends) * nodes) == pytest.approx(one, rel=ROUNDING)
+    assert np.sum(spline.scatter(by_ends) * nodes) == pytest.approx(one, rel=ROUNDING)
     changes = np.random.default_rng(3).normal(size=(*nodes.shape, 2))
     step = np.random.default_rng(4).normal(size=(len(nodes), 2))
     moved = np.einsum("kond,kd->kon", changes, step)

@@ -11,7 +11,7 @@ from numba.core import event
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.realtime import Replanner, Segment, SimulatedArm, State
-from selfmotion.realtime.warm import Compiled
+from selfmotion.realtime.warm import CompilationCounter
 from support import realtime_scenarios as scenarios
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
@@ -84,7 +84,7 @@ def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
 ) -> None:
     replanner = looped(*kinds)
     realtime.warm_up(replanner)
-    listener = Compiled()
+    listener = CompilationCounter()
     with event.install_listener("numba:compile", listener):
         segments, _ = closed_loop(replanner, slow_circle, PANDA_HOME, 0.3)
         del segments

@@ -10,7 +10,8 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.collision import ClearanceModel
 from selfmotion.realtime import Flag
-from selfmotion.realtime.clear import Surroundings, _Proof
+from selfmotion.realtime.distance_proof import DistanceProof
+from selfmotion.realtime.moving_clearance import MovingClearance
 from selfmotion.realtime.settings import NEARER
 from support.arms import PANDA_HOME, robot_named
 from support.realtime_bodies import (
@@ -58,13 +59,13 @@ def test_the_judges_of_segments_reject_what_is_broken() -> None:
 def test_the_proof_alone_stops_the_arm(monkeypatch: pytest.MonkeyPatch, *, is_proved: bool) -> None:
     """Plans that see no body: with the proof no segment comes too near, without it some do."""
 
-    def none(self: Surroundings, samples: object, by_q: Array) -> tuple[Array, Array]:
+    def none(self: MovingClearance, samples: object, by_q: Array) -> tuple[Array, Array]:
         self.blocked = False
         return np.zeros((0, by_q.shape[2])), np.zeros(0)
 
-    monkeypatch.setattr(Surroundings, "rows", none)
+    monkeypatch.setattr(MovingClearance, "rows", none)
     if not is_proved:
-        monkeypatch.setattr(Surroundings, "unproved", lambda *_: "")
+        monkeypatch.setattr(MovingClearance, "proof_failure", lambda *_: "")
     worst = max(max(judged(run(looped(), seed, 100))) for seed in range(4))
     assert worst <= 0.0 if is_proved else worst > 0.0
 
@@ -73,8 +74,8 @@ def test_of_several_clearances_each_has_its_own_distance(panda: sm.RobotModel) -
     """And each pair of links is looked at once, with the largest."""
     far, beside = (sm.obstacles.Sphere(name, np.zeros(3), 0.05) for name in ("far", "beside"))
     models = [sm.obstacles.CollisionModel(panda, [ball]) for ball in (far, beside)]
-    around = Surroundings(panda, [(models[0], 0.1), (models[1], 0.02)])
-    pairs = [(set(pair), proof.far) for proof in around._proofs for pair in proof.pairs]
+    around = MovingClearance(panda, [(models[0], 0.1), (models[1], 0.02)])
+    pairs = [(set(pair), proof.min_distance) for proof in around._proofs for pair in proof.pairs]
     assert {distance for pair, distance in pairs if "far" in pair} == {0.1}
     assert {distance for pair, distance in pairs if "beside" in pair} == {0.02}
     links = [(frozenset(pair), d) for pair, d in pairs if not pair & {"far", "beside"}]
@@ -99,14 +100,14 @@ def test_a_motion_through_a_body_between_cycles_is_not_proved(panda: sm.RobotMod
     turns[:, 0] += [0.0, 0.6, 1.2]
     ball = ball_at(panda.pose(turns[1]).translation, 0.02)
     model = sm.obstacles.CollisionModel(panda, [ball])
-    around = Surroundings(panda, [(model, FAR)])
+    around = MovingClearance(panda, [(model, FAR)])
     q, times = turns[[0, 2]], np.array([0.0, 1e-3])
     assert min(model.distance(each).value for each in q) > FAR
     travelled = np.stack([np.zeros(7), np.abs(q[1] - q[0])])
-    assert "not proved" in around.unproved(q, travelled, times)
-    assert around.unproved(q[[0, 0]], np.zeros((2, 7)), times) == ""
+    assert "not proved" in around.proof_failure(q, travelled, times)
+    assert around.proof_failure(q[[0, 0]], np.zeros((2, 7)), times) == ""
     # A path length that is no number proves nothing.
-    assert "not proved" in around.unproved(q[[0, 0]], np.full((2, 7), np.nan), times)
+    assert "not proved" in around.proof_failure(q[[0, 0]], np.full((2, 7), np.nan), times)
 
 
 def test_pairs_whose_hulls_always_overlap_are_proved_by_their_meshes() -> None:
@@ -120,11 +121,11 @@ def test_pairs_whose_hulls_always_overlap_are_proved_by_their_meshes() -> None:
     away, near = drawn[int(np.argmax(each))], drawn[int(np.argmin(each))]
     others = [pair for pair in exact.pairs if pair not in meshes.pairs]
     alone = sm.obstacles.CollisionModel(robot, (), others)
-    around = Surroundings(robot, [(alone, 0.5 * float(each.max() + each.min()))])
+    around = MovingClearance(robot, [(alone, 0.5 * float(each.max() + each.min()))])
     times = np.array([0.0, 1.0])
-    assert around.unproved(np.stack([away, away]), np.zeros((2, 6)), times) == ""
+    assert around.proof_failure(np.stack([away, away]), np.zeros((2, 6)), times) == ""
     travelled = np.stack([np.zeros(6), np.abs(near - away)])
-    assert "not proved" in around.unproved(np.stack([away, near]), travelled, times)
+    assert "not proved" in around.proof_failure(np.stack([away, near]), travelled, times)
 
 
 def test_a_body_on_a_link_that_moves_there_lengthens_levers(panda: sm.RobotModel) -> None:
@@ -138,25 +139,31 @@ def test_a_body_on_a_link_that_moves_there_lengthens_levers(panda: sm.RobotModel
     assert most <= model.displacement("torch", moved) <= 3.0 * most
 
 
+def next_required(proof: DistanceProof, distances: Array) -> Array:
+    """Return what pairs keep during a segment that begins at these distances."""
+    proof.raise_floor(distances)
+    return proof.required(distances)
+
+
 def test_what_one_segment_may_give_away_is_not_given_away_again() -> None:
     """Segment after segment, each to where it may go: however many, no nearer than by that once."""
     pairs = ("link", "ball"), ("link", "post")
-    proof = _Proof(lambda q, asked: q, pairs, FAR, np.ones((2, 1)), 4, remembers=False)
+    proof = DistanceProof(lambda q, selected: q, pairs, FAR, np.ones((2, 1)), 4, reuses=False)
     now = np.array([FAR + 0.5 * NEARER, 0.4 * FAR])
     for _ in range(200):
-        now = proof.required(now)
+        now = next_required(proof, now)
     np.testing.assert_allclose(now, [FAR - NEARER, 0.4 * FAR - NEARER], rtol=0.0, atol=1e-12)
     # What has got away has to stay away.
-    assert proof.required(np.array([FAR, 0.8 * FAR]))[1] == pytest.approx(0.8 * FAR - NEARER)
+    assert next_required(proof, np.array([FAR, 0.8 * FAR]))[1] == pytest.approx(0.8 * FAR - NEARER)
     # Of an arm that was pushed nearer, or a body that was told to be: nearer no more, or anew.
-    pushed = proof.required(np.array([FAR - 1.5 * NEARER, 0.1 * FAR]))
+    pushed = next_required(proof, np.array([FAR - 1.5 * NEARER, 0.1 * FAR]))
     np.testing.assert_allclose(pushed, [FAR - 1.5 * NEARER, 0.1 * FAR - NEARER])
     # By what a body comes nearer, or leaves, the arm neither loses nor gains room.
-    floor = proof.required(pushed)
-    proof.bodies_moved(np.array([-2e-4, 0.0]))
-    np.testing.assert_allclose(proof.required(floor - [2e-4, 0.0]), floor - [2e-4, 0.0])
+    floor = next_required(proof, pushed)
+    proof.shift_floor(np.array([-2e-4, 0.0]))
+    np.testing.assert_allclose(next_required(proof, floor - [2e-4, 0.0]), floor - [2e-4, 0.0])
     proof.forget()
-    assert proof.required(np.array([0.5 * FAR, FAR]))[0] == pytest.approx(0.5 * FAR - NEARER)
+    assert next_required(proof, np.array([0.5 * FAR, FAR]))[0] == pytest.approx(0.5 * FAR - NEARER)
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-5, 3e-4, 2e-3])
@@ -165,7 +172,7 @@ def test_bodies_that_jitter_give_nothing_away(panda: sm.RobotModel, jitter: floa
     far, most = 0.02, 5e-3
     place = panda.pose(PANDA_HOME).act(np.array([0.0, 0.0, 0.04]))
     model = sm.obstacles.CollisionModel(panda, [ball_at(place, 0.03)])
-    around = Surroundings(panda, [(model, far)])
+    around = MovingClearance(panda, [(model, far)])
     (proof,) = around._proofs
     near = proof.distances(PANDA_HOME) < far - most
     assert near.any()
@@ -176,6 +183,6 @@ def test_bodies_that_jitter_give_nothing_away(panda: sm.RobotModel, jitter: floa
         off *= min(1.0, most / max(float(np.linalg.norm(off)), most))
         around.move({"ball": pin.SE3(np.eye(3), place + off)}, PANDA_HOME)
         there = proof.distances(PANDA_HOME)
-        came = there - proof.required(there - came)
+        came = there - next_required(proof, there - came)
         assert came[near].max() <= NEARER + ROUNDED
     assert came[near].max() == pytest.approx(NEARER)

@@ -8,8 +8,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.planning.result import CheckedMotion, MotionSpecification, gaps
-from selfmotion.planning.result.specification import same_path
+from selfmotion.planning.result import CheckedMotion, MotionSpecification, continuity_faults
+from selfmotion.planning.result.equality import same_path
 from support.arms import robot_named
 
 # A bump of the path: far above what paths that are one may differ by [m].
@@ -229,7 +229,7 @@ def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan)
         return CheckedMotion("'other'", replace(motion, **changes))
 
     back = replace(motion, q=motion.q[::-1], qd=-motion.qd[::-1], qdd=np.array(motion.qdd)[::-1])
-    assert not list(gaps(robot, [whole, CheckedMotion("'back'", back)]))
+    assert not list(continuity_faults(robot, [whole, CheckedMotion("'back'", back)]))
     rate = np.array(back.qd)
     rate[0, 1] = 2e-6
     push = np.array(back.qdd)
@@ -239,11 +239,15 @@ def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan)
         (moved(q=back.q, qd=rate, qdd=back.qdd), "'joint2' moves at 2e-06 rad/s (1e-06"),
         (moved(q=back.q, qd=back.qd, qdd=push), "accelerates at 0.002 rad/s² (0.001"),
     ):
-        assert said in "; ".join(gaps(robot, [whole, piece]))
+        assert said in "; ".join(continuity_faults(robot, [whole, piece]))
     # Between its samples a cubic among quintics would be another motion.
     cubic = CheckedMotion("'other'", replace(back, qdd=None))
-    assert "'other' states no accelerations" in "; ".join(gaps(robot, [whole, cubic]))
-    assert not list(gaps(robot, [cubic, CheckedMotion("'one'", replace(motion, qdd=None))]))
+    assert "'other' states no accelerations" in "; ".join(continuity_faults(robot, [whole, cubic]))
+    assert not list(
+        continuity_faults(robot, [cubic, CheckedMotion("'one'", replace(motion, qdd=None))])
+    )
     # But where the tool's own motion accelerates.
     pushed = replace(motion, q=back.q, qd=back.qd, qdd=push)
-    assert not list(gaps(robot, [whole, CheckedMotion("'feed'", pushed, (True, True))]))
+    assert not list(
+        continuity_faults(robot, [whole, CheckedMotion("'feed'", pushed, (True, True))])
+    )

@@ -15,8 +15,8 @@ from selfmotion.model.robot import null_space
 from selfmotion.planning.optimise import minimize_quadratic
 from selfmotion.planning.rollout import Rollout
 from selfmotion.problem.costs import Cost, Samples
-from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import CURVE_LOWER, CURVE_UPPER, DECELERATION
+from selfmotion.realtime.moving_clearance import MovingClearance
 from selfmotion.realtime.pace import Pace
 from selfmotion.realtime.quantities import Quantities
 from selfmotion.realtime.settings import (
@@ -184,7 +184,7 @@ class Horizon:
         Runge-Kutta steps.
     commands : (M,)
         Times from now on at which ε is commanded [s].
-    surroundings : Surroundings, optional
+    clearance : MovingClearance, optional
         Collision constraints.
     quantities : Quantities, optional
         Other constraints.
@@ -210,7 +210,7 @@ class Horizon:
         duration: float,
         steps: int,
         commands: Array,
-        surroundings: Surroundings | None = None,
+        clearance: MovingClearance | None = None,
         quantities: Quantities | None = None,
     ) -> None:
         self.grid = Grid(graded(duration, steps))
@@ -218,7 +218,7 @@ class Horizon:
         self.rollout = Rollout(follows, self.grid)
         self.redundancy = follows.redundancy
         self._costs, self._duration = tuple(costs), duration
-        self._null_motion, self._around = null_motion, surroundings
+        self._null_motion, self._clearance = null_motion, clearance
         self._quantities = quantities
         self.pace = Pace(duration, self.grid.nodes)
         # Made once.
@@ -502,8 +502,8 @@ class Horizon:
         below = []
         if len(self._curved):
             below.append(self._curve_rows(samples, by_q, by_qd))
-        if self._around is not None:
-            below.append(self._around.rows(samples, by_q))
+        if self._clearance is not None:
+            below.append(self._clearance.rows(samples, by_q))
         if self._quantities is not None:
             below.append(self._quantities.rows(samples, by_q, by_qd, self.size))
         if not below:

@@ -14,6 +14,9 @@ from selfmotion.model.task import SE3
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 
+# Steps until all kernels are compiled: the first ones start a plan, the others shift it.
+_WARM_UP_STEPS = 5
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -71,7 +74,7 @@ def follow(
 
     Returns
     -------
-    Number of segments.
+    int
         How many segments were written.
 
     Raises
@@ -101,12 +104,8 @@ def follow(
     return count
 
 
-# Steps until all kernels are compiled: the first ones start a plan, the others shift it.
-_STEPS = 5
-
-
 def warm_up(replanner: Replanner) -> None:
-    """Let a replanner do all that it may have to do, and forget it: no step compiles later.
+    """Compile and load all kernels of a replanner, so that no later step waits for them.
 
     Kernels are compiled once per machine and loaded once per process, which takes seconds where
     the first step of a moving arm would wait for it.
@@ -127,6 +126,6 @@ def warm_up(replanner: Replanner) -> None:
         replanner.reset()
         path = Line(pose, goal, 1.0)
         replanner.step(0.0, q, zero, path)
-        for k in range(1, _STEPS):
+        for k in range(1, _WARM_UP_STEPS):
             replanner.step(k * replanner.period, measured, zero, path)
     replanner.reset()

@@ -13,7 +13,7 @@ from selfmotion.certificate import MotionSegments, Quantity, Shares
 from selfmotion.model.motion import Sampling
 from selfmotion.model.robot import ChainSeries, RobotModel
 from selfmotion.problem.constraints import BoundQuantity, Constraint, NodeTangents, linearised
-from selfmotion.problem.costs import PlacedLater, Samples
+from selfmotion.problem.costs import LazySamples, Samples
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.settings import (
     ACCELERATED_RESERVE,
@@ -97,7 +97,7 @@ class Quantities:
         near = self._near or _NearTimes(samples.sampling)
         self._near, nodes, later = near, samples.nodes, near.later
         q, qd = near.motion(samples.q[nodes], samples.qd[nodes])
-        between = PlacedLater(samples.follows, near.sampling, q=q, qd=qd)
+        between = LazySamples(samples.follows, near.sampling, q=q, qd=qd)
         motion = NodeTangents(*near.motion(by_q[nodes], by_qd[nodes]), near.sampling)
         rows, room = [np.zeros((0, motion.size))], [np.zeros(0)]
         for item, accelerated, of_pace in self._conditions:

@@ -32,7 +32,6 @@ from selfmotion.realtime.checks import (
     observed_target,
 )
 from selfmotion.realtime.chunks import Chunk, blend
-from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import (
     Commands,
     cycles_of_mean,
@@ -41,6 +40,7 @@ from selfmotion.realtime.commands import (
     planned_limits,
 )
 from selfmotion.realtime.horizon import Horizon, is_damped
+from selfmotion.realtime.moving_clearance import MovingClearance
 from selfmotion.realtime.pace import LastPath, Sampled, Times
 from selfmotion.realtime.quantities import Quantities, is_quantity
 from selfmotion.realtime.reference import Approach, Reference
@@ -155,7 +155,7 @@ class Replanner:
         self.limits, self.jerk_limit = limits[:4], envelope.jerk
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
-        self._around = Surroundings(robot, envelope.bodies) if envelope.bodies else None
+        self._clearance = MovingClearance(robot, envelope.bodies) if envelope.bodies else None
         mean = cycles_of_mean(robot, envelope, self.cycle)
         others, jerk = (
             [item for item in constraints if is_quantity(item)],
@@ -173,7 +173,7 @@ class Replanner:
             self.horizon,
             steps,
             self._ahead,
-            self._around,
+            self._clearance,
             self._quantities,
         )
         self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
@@ -316,8 +316,8 @@ class Replanner:
         commands = self._commands
         passed = commands.go_on(t)
         moving = self._measure(q, passed, reasons)
-        if self._around is not None:
-            self._around.move(obstacles, commands.place)
+        if self._clearance is not None:
+            self._clearance.move(obstacles, commands.place)
         waited = max(passed, self.cycle)
         self._pace.shift(passed)
         target = self._target(path, waited, age, reasons)
@@ -337,8 +337,8 @@ class Replanner:
             lambda cycle, share: commands.segment(cycle, flag, said, follows, error, delay, share),
             first,
         )
-        if not unproved and self._around is not None:
-            unproved = self._around.unproved(*self._expected(issued))
+        if not unproved and self._clearance is not None:
+            unproved = self._clearance.proof_failure(*self._expected(issued))
         if unproved:
             # The segment before, which is proved, runs to its stop.
             reasons.append(unproved)
@@ -402,7 +402,7 @@ class Replanner:
         self._without_state = self._without_motion = 0.0
         self._horizon.forget()
         self._share = 1.0
-        for kept in (self._around, self._quantities):
+        for kept in (self._clearance, self._quantities):
             if kept is not None:
                 kept.forget()
         self._pace.reset()
@@ -548,8 +548,8 @@ class Replanner:
                 reasons.append("the tool waits on its path")
             if horizon.elastic:
                 reasons.append("no self-motion keeps all limits over the horizon")
-            if self._around is not None and self._around.blocked:
-                reasons.append(self._around.message)
+            if self._clearance is not None and self._clearance.blocked:
+                reasons.append(self._clearance.message)
                 flag = Flag.STOPPING
         else:
             reasons.append(failure)

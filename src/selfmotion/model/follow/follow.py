@@ -18,18 +18,7 @@ from selfmotion.model.task import SE3, Task, as_pose
 # Grids of times whose samples of a path are cached.
 _GRIDS = 4
 _Value = TypeVar("_Value")
-_Recent = list[tuple[Array, _Value]]
-
-
-def _recent(known: _Recent[_Value], t: Array, evaluate: Callable[[Array], _Value]) -> _Value:
-    """Return a function's value at times (K,), one of the last few where it is known."""
-    for times, value in known:
-        if np.array_equal(times, t):
-            return value
-    found = evaluate(t)
-    known.insert(0, (np.array(t), found))
-    del known[_GRIDS:]
-    return found
+_Cache = list[tuple[Array, _Value]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,19 +52,19 @@ class Follow:
         if not isinstance(self.path, Path):
             object.__setattr__(self, "path", as_pose(self.path, "follow: the path"))
         for name in ("tool", "reference"):
-            given = getattr(self, name)
-            if not isinstance(given, str | None):
-                raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
+            link = getattr(self, name)
+            if not isinstance(link, str | None):
+                raise ProblemError(f"follow: {name} is {shown(link)}, expected the name of a link")
 
     def on(self, robot: RobotModel, duration: float) -> BoundTaskFrame:
-        """Return the same bound to an arm, for a duration [s].
+        """Return the task frame on an arm, for a duration [s].
 
         Raises
         ------
         RobotError
-            There is no such link.
+            The arm has no such link.
         ProblemError
-            The path lasts longer or shorter.
+            The path has another duration.
         """
         path: Any = self.path
         if not isinstance(path, Path):
@@ -112,19 +101,19 @@ class BoundTaskFrame:
     chain: Chain
     path: Path
     task: Task
-    _targets: _Recent[PathSamples] = field(default_factory=list, init=False, repr=False)
-    _rates: _Recent[Array] = field(default_factory=list, init=False, repr=False)
+    _targets: _Cache[PathSamples] = field(default_factory=list, init=False, repr=False)
+    _rates: _Cache[Array] = field(default_factory=list, init=False, repr=False)
 
     def target(self, t: Array) -> PathSamples:
         """Return the prescribed pose and twist of the tip at times t (K,).
 
         The last few times are cached: many motions are evaluated on the same grids.
         """
-        return _recent(self._targets, t, self.path.samples)
+        return _cached(self._targets, t, self.path.samples)
 
     def twist_rates(self, t: Array) -> Array:
         """Return the rates of the path's twists at times t (K,), (K, 6); cached as targets are."""
-        return _recent(self._rates, t, partial(twist_rates, self.path))
+        return _cached(self._rates, t, partial(twist_rates, self.path))
 
     def jacobian(self, q: Array) -> Array:
         """Return the prescribed rows of the Jacobian at q (n,), (m, n); q is not checked."""
@@ -145,3 +134,14 @@ class BoundTaskFrame:
     def miss(self, pose: SE3, q: Array) -> tuple[float, float]:
         """Return the distance of the tip at q (n,) from a pose in the rows, (m, rad)."""
         return self.task.miss(pose, self.chain.place(q))
+
+
+def _cached(cache: _Cache[_Value], t: Array, evaluate: Callable[[Array], _Value]) -> _Value:
+    """Return a function's value at times t (K,), from the last few that are cached if possible."""
+    for times, value in cache:
+        if np.array_equal(times, t):
+            return value
+    value = evaluate(t)
+    cache.insert(0, (np.array(t), value))
+    del cache[_GRIDS:]
+    return value

@@ -26,39 +26,46 @@ _LEFT_OUT = ("type", "vars")
 _FUNCTIONS = ("list", "dict", "map", "str", "float", "int")
 
 
-class Refused(Exception):
-    """An expression is no arithmetic."""
+class ExpressionError(Exception):
+    """An expression does more than arithmetic."""
 
 
 def check_expression(text: str) -> None:
-    """Raise `Refused` for an expression that does more than arithmetic.
+    """Raise `ExpressionError` for an expression that does more than arithmetic.
 
     Raises
     ------
-    Refused
+    ExpressionError
     SyntaxError
         It is no expression of Python.
     """
     for node in ast.walk(ast.parse(text.strip(), mode="eval")):
-        said = ""
-        if not isinstance(node, _FORMS):
-            said = type(node).__name__.lower()
-        elif isinstance(node, ast.Name) and node.id.startswith("__"):
-            said = node.id
-        elif isinstance(node, ast.Attribute):
-            name = node.attr
-            if name.startswith(("__", *_INNER)) or name in _FRAMES:
-                said = name
-        if said:
-            raise Refused(
-                f"the expression '{text.strip()[:60]}' is code ({said}), which is never run; "
+        code = _code_in(node)
+        if code:
+            raise ExpressionError(
+                f"the expression '{text.strip()[:60]}' is code ({code}), which is never run; "
                 f"write a number, a text or arithmetic"
             )
 
 
+def _code_in(node: ast.AST) -> str:
+    """Return what a node is that leads beyond arithmetic; "" for nothing."""
+    if not isinstance(node, _FORMS):
+        return type(node).__name__.lower()
+    if isinstance(node, ast.Name) and node.id.startswith("__"):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        name = node.attr
+        if name.startswith(("__", *_INNER)) or name in _FRAMES:
+            return name
+    return ""
+
+
 @contextlib.contextmanager
 def only_arithmetic(find: Any) -> Iterator[None]:
-    """Let xacro evaluate nothing but arithmetic, and find packages by a function, meanwhile.
+    """Let xacro evaluate nothing but arithmetic, and find packages by the function `find`.
+
+    The functions of xacro that evaluate expressions are replaced while the context lasts.
 
     State of xacro between files, and its additions to the reader of YAML, are removed afterwards.
     """
@@ -66,13 +73,13 @@ def only_arithmetic(find: Any) -> Iterator[None]:
     import yaml
     from xacro import substitution_args
 
-    own = xacro.safe_eval
+    xacro_eval = xacro.safe_eval
 
-    def evaluated(text: str, known: Any, local: Any = None) -> Any:
+    def evaluate(text: str, known: Any, local: Any = None) -> Any:
         check_expression(text)
-        return own(text, known, local)
+        return xacro_eval(text, known, local)
 
-    def evaluated_argument(text: str, context: Any) -> str:
+    def evaluate_argument(text: str, context: Any) -> str:
         check_expression(text)
         arguments = context.setdefault("arg", {})
         known = _Arguments(
@@ -96,15 +103,15 @@ def only_arithmetic(find: Any) -> Iterator[None]:
     for name in _LEFT_OUT:
         symbols["python"].pop(name, None)
     constructors = dict(yaml.SafeLoader.yaml_constructors)
-    changed: list[tuple[Any, str, Any]] = [
-        (xacro, "safe_eval", evaluated),
+    replacements: list[tuple[Any, str, Any]] = [
+        (xacro, "safe_eval", evaluate),
         (xacro, "_global_symbols", symbols),
-        (substitution_args, "_eval", evaluated_argument),
+        (substitution_args, "_eval", evaluate_argument),
         (substitution_args, "_eval_find", find),
     ]
-    before = [(module, name, getattr(module, name)) for module, name, _ in changed]
+    before = [(module, name, getattr(module, name)) for module, name, _ in replacements]
     try:
-        for module, name, item in changed:
+        for module, name, item in replacements:
             setattr(module, name, item)
         yield
     finally:
@@ -117,10 +124,10 @@ class _Arguments(dict[str, Any]):
     """Names in $(eval …): functions, and arguments by their values."""
 
     def __init__(
-        self, arguments: Mapping[str, str], functions: Mapping[str, Any], read: Any
+        self, arguments: Mapping[str, str], functions: Mapping[str, Any], convert: Any
     ) -> None:
         super().__init__(functions)
-        self._arguments, self._read = arguments, read
+        self._arguments, self._convert = arguments, convert
 
     def __missing__(self, name: str) -> Any:
-        return self._read(self._arguments[name], "auto")
+        return self._convert(self._arguments[name], "auto")

@@ -9,13 +9,13 @@ from selfmotion.basics import Array, read_only
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling
 from selfmotion.problem.constraints import BoundConstraint, DependsOn
-from selfmotion.problem.costs import PlacedLater, Samples
+from selfmotion.problem.costs import LazySamples, Samples
 
 # Derivatives of samples, by order.
 _NAMES = ("q", "qd", "qdd", "qddd")
 
 
-class CurveSamples(PlacedLater):
+class CurveSamples(LazySamples):
     """A motion whose derivatives are known.
 
     Parameters

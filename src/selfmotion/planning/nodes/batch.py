@@ -156,7 +156,7 @@ class Batch:
         spline = grid.spline
         slopes = slopes_of(motion).copy()
         slopes[spline.gaps] = 0.0
-        force = spline.scattered(slopes)
+        force = spline.scatter(slopes)
         around = LocalModel.of(
             motion.charts, motion.nu, motion.alpha, motion.place, force, grid.scale
         )

@@ -84,12 +84,12 @@ class Model(NamedTuple):
         grid, spline = motion.grid, motion.grid.spline
         grid.counts.gradients += 1
         slopes = slopes_of(motion)
-        by_cost = spline.scattered(slopes)
+        by_cost = spline.scatter(slopes)
         rows = grid.rows.linearised(lambda: motion.checked, own.active)
         force, multipliers = by_cost, own.of_all(own.multipliers)
         wild = float(np.max(own.h, initial=0.0)) > SETTINGS.gauss_newton_violation
         if not wild and own.multipliers.size:
-            force = force + spline.scattered(rows.pulled(multipliers))
+            force = force + spline.scatter(rows.pulled(multipliers))
         if not wild and len(motion.c):
             force = force + grid.ends.pulled(end_multipliers, len(force))
         around = LocalModel.of(

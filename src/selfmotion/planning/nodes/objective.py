@@ -30,7 +30,7 @@ from selfmotion.planning.nodes.quadratic import (
 )
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, Quintic
-from selfmotion.problem.costs import Partials, PlacedLater, Samples, is_quadratic_form
+from selfmotion.problem.costs import LazySamples, Partials, Samples, is_quadratic_form
 
 # Step of one-sided differences of costs' gradients [rad, m and their rates]: this matrix need not
 # be exact.
@@ -172,7 +172,7 @@ def _changed(
         flat[name][k * count : (k + 1) * count] += _NEAR * direction
     t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
     sampling = Sampling(t, weights, np.arange(len(t)))
-    shifted = PlacedLater(cost._follows, sampling, **flat)
+    shifted = LazySamples(cost._follows, sampling, **flat)
     there = summed([cost.gradient(shifted) for cost in cost._bent])
     parts = {}
     for name in NAMES:

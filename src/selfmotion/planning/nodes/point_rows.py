@@ -9,7 +9,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, Ints, ProblemError, kernel
 from selfmotion.planning.formulation import SampledMotion
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
-from selfmotion.planning.nodes.spline import ORDERS, Quintic, point_shares
+from selfmotion.planning.nodes.spline import ORDERS, Quintic, point_matrices
 from selfmotion.problem.constraints import (
     BoundConstraint,
     Multipliers,
@@ -137,13 +137,15 @@ class CollocationRows:
     def linearised(self, motion: SampledMotion, active: Flags) -> PointRows:
         """Return the derivatives of the active rows."""
         which = np.flatnonzero(active)
-        intervals, shares = point_shares(self._spline, which // self.count if which.size else which)
+        intervals, matrices = point_matrices(
+            self._spline, which // self.count if which.size else which
+        )
         found = np.zeros((len(which), 6, self._dof))
         if which.size:
             samples = motion.seen_by(self.item)
             rows = linearised(self.item, samples, self._units).picked(self._units, which)
             by = rows.reshape(len(which), ORDERS, -1)
-            found[:, :, self._columns] = np.swapaxes(shares, 1, 2) @ by
+            found[:, :, self._columns] = np.swapaxes(matrices, 1, 2) @ by
         return PointRows(intervals, found)
 
     def add_bending(
@@ -158,9 +160,9 @@ class CollocationRows:
             return
         slopes = np.sqrt(np.abs(multipliers))[:, :1, None] * slopes
         points, which = np.nonzero(slopes.any(axis=2))
-        intervals, shares = point_shares(self._spline, points)
+        intervals, matrices = point_matrices(self._spline, points)
         rows = np.zeros((len(points), 6, self._dof))
-        rows[:, :, self._columns] = shares[:, 0, :, None] * slopes[points, which][:, None, :]
+        rows[:, :, self._columns] = matrices[:, 0, :, None] * slopes[points, which][:, None, :]
         PointRows(intervals, rows).add_squared(matrix, by, np.ones(len(points)))
 
     def multipliers_of(self, multipliers: Array) -> Multipliers:

@@ -17,7 +17,7 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, WEIGHTS, Quintic
-from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples, is_quadratic_form
+from selfmotion.problem.costs import Cost, LazySamples, Partials, Samples, is_quadratic_form
 
 # Derivatives of a sample, by order.
 NAMES = ("q", "qd", "qdd", "qddd")
@@ -124,7 +124,7 @@ class QuadraticForms:
         if self._costs:
             sampling = spline.sampling
             none = {name: np.zeros((len(sampling.t), self._dof)) for name in NAMES}
-            there = PlacedLater(self._follows, sampling, **none)
+            there = LazySamples(self._follows, sampling, **none)
             values += integrals(spline, self._costs, there)
             partials = summed([cost.gradient(there) for cost in self._costs])
             slopes[:, :, : self._dof] = by_ends(spline, partials, there)

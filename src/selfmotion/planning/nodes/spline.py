@@ -37,7 +37,7 @@ FINE_POINTS = np.array([0.0, 0.25, 0.5, 0.75])
 
 
 def _powers(s: Array, order: int) -> Array:
-    """Return the derivatives of 1, s, … s⁵ at s (S,), (S, 6)."""
+    """Return the derivatives of an order of 1, s, … s⁵ at s (S,), (S, 6)."""
     each = [perm(p, order) * s ** max(p - order, 0) for p in range(6)]
     return np.stack([x * np.ones_like(s) for x in each], axis=1)
 
@@ -60,13 +60,13 @@ def _bases_at(shares: tuple[float, ...]) -> tuple[Array, ...]:
 
 def _controls() -> tuple[Array, ...]:
     """Return the matrices of the control points of q, q̇, q̈ and jerk by y, (6 - o, 6) each."""
-    found = []
+    controls = []
     for order, count in enumerate(CONTROLS):
         s, degree = np.linspace(0.0, 1.0, count), count - 1
         terms = [comb(degree, i) * s**i * (1.0 - s) ** (degree - i) for i in range(count)]
-        solved = np.linalg.solve(np.stack(terms, axis=1), unit_bases(s)[order])
-        found.append(np.asarray(solved, dtype=np.float64))
-    return tuple(found)
+        matrix = np.linalg.solve(np.stack(terms, axis=1), unit_bases(s)[order])
+        controls.append(np.asarray(matrix, dtype=np.float64))
+    return tuple(controls)
 
 
 AT_GAUSS = unit_bases(GAUSS)
@@ -121,7 +121,7 @@ class Quintic:
 
     @property
     def count(self) -> int:
-        """N."""
+        """Number of intervals N."""
         return len(self.steps)
 
     @cached_property
@@ -137,21 +137,24 @@ class Quintic:
 
     def ends(self, nodes: Array) -> Array:
         """Return y of each interval, (N, 6, n), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
-        found = np.concatenate([nodes[:-1], nodes[1:]], axis=1) * self._powers[:, :, None]
+        y = np.concatenate([nodes[:-1], nodes[1:]], axis=1) * self._powers[:, :, None]
         if self.gaps.size:
-            found[self.gaps, 3] = found[self.gaps, 0]
-            found[np.ix_(self.gaps, np.array([1, 2, 4, 5]))] = 0.0
-        return np.asarray(found)
+            y[self.gaps, 3] = y[self.gaps, 0]
+            y[np.ix_(self.gaps, np.array([1, 2, 4, 5]))] = 0.0
+        return np.asarray(y)
 
-    def scattered(self, by_ends: Array) -> Array:
-        """Return derivatives by (q, q̇, q̈) of the nodes, for those by y (N, 6, n), (N + 1, 3, n)."""
-        own = by_ends * self._powers[:, :, None]
+    def scatter(self, by_ends: Array) -> Array:
+        """Return derivatives by (q, q̇, q̈) of the nodes, for those by y (N, 6, n), (N + 1, 3, n).
+
+        The adjoint of `ends`.
+        """
+        scaled = by_ends * self._powers[:, :, None]
         if self.gaps.size:
-            own[self.gaps] = 0.0
-        found = np.zeros((self.count + 1, 3, own.shape[2]))
-        found[:-1] += own[:, :3]
-        found[1:] += own[:, 3:]
-        return found
+            scaled[self.gaps] = 0.0
+        by_nodes = np.zeros((self.count + 1, 3, scaled.shape[2]))
+        by_nodes[:-1] += scaled[:, :3]
+        by_nodes[1:] += scaled[:, 3:]
+        return by_nodes
 
     def changes(self, nodes: Array) -> EndChanges:
         """Return ∂y/∂w of all intervals; `nodes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes."""
@@ -159,9 +162,9 @@ class Quintic:
 
     @cached_property
     def _powers_moving(self) -> Array:
-        found = np.array(self._powers)
-        found[self.gaps] = 0.0
-        return found
+        powers = np.array(self._powers)
+        powers[self.gaps] = 0.0
+        return powers
 
     def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
         """Return a derivative at shares of all intervals, (N, S, n), for their U_o and y."""
@@ -184,10 +187,10 @@ def control_times(spline: Quintic, order: int) -> Array:
     return np.asarray(spline.t[:-1, None] + spline.steps[:, None] * shares)
 
 
-def point_shares(spline: Quintic, which: Ints) -> tuple[Ints, Array]:
-    """Return the intervals of some points (R,), and q … jerk there as matrices of y.
+def point_matrices(spline: Quintic, which: Ints) -> tuple[Ints, Array]:
+    """Return the intervals of some points, and the matrices from y to q … jerk there.
 
-    (R,) and (R, 4, 6).
+    Points are given by their indices (R,); the result is (R,) and (R, 4, 6).
     """
     count = len(spline._shares)
     last = which == count * spline.count

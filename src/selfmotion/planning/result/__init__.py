@@ -18,6 +18,16 @@ from selfmotion.planning.result.bundles import (
     write_bundle as write_bundle,
 )
 from selfmotion.planning.result.comparison import Comparison as Comparison, compare as compare
+from selfmotion.planning.result.continuity import (
+    CheckedMotion as CheckedMotion,
+    continuity_faults as continuity_faults,
+    end_position_faults as end_position_faults,
+    rest_faults as rest_faults,
+)
+from selfmotion.planning.result.equality import (
+    arm_differences as arm_differences,
+    arm_digest as arm_digest,
+)
 from selfmotion.planning.result.measured import (
     LimitsUsed as LimitsUsed,
     NullSpaceVelocity as NullSpaceVelocity,
@@ -49,15 +59,8 @@ from selfmotion.planning.result.retiming import (
 )
 from selfmotion.planning.result.reversals import Reversals as Reversals
 from selfmotion.planning.result.specification import (
-    CheckedMotion as CheckedMotion,
     MotionSpecification as MotionSpecification,
-    another_tool as another_tool,
-    arm_digest as arm_digest,
-    described as described,
-    elsewhere as elsewhere,
-    gaps as gaps,
-    moving_end as moving_end,
-    not_judged_by as not_judged_by,
+    missing_constraints as missing_constraints,
 )
 
 __all__ = [

@@ -20,7 +20,7 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.model.robot import null_space
 from selfmotion.planning.result.pace_rows import PaceLimits
-from selfmotion.problem.costs import Cost, PlacedLater, Samples
+from selfmotion.problem.costs import Cost, LazySamples, Samples
 from selfmotion.problem.problem import Problem, envelope_of_problem
 
 # Share of a limit from which on it counts as fully used.
@@ -181,4 +181,4 @@ def _samples(follows: Follows, motion: Trajectory) -> Samples:
     t = (motion.t[:-1, None] + steps * 0.5 * (1.0 + _ROOTS)).ravel()
     sampling = Sampling(t, (steps * 0.5 * _WEIGHTS).ravel(), np.arange(len(t)))
     q, qd, qdd, qddd = (motion(t, order) for order in range(4))
-    return PlacedLater(follows, sampling, q=q, qd=qd, qdd=qdd, qddd=qddd)
+    return LazySamples(follows, sampling, q=q, qd=qd, qdd=qdd, qddd=qddd)

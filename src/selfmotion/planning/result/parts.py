@@ -19,18 +19,15 @@ from selfmotion.model.motion import Trajectory, joined_motions
 from selfmotion.model.path import Path, Retimed
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result.bundles import read_bundle, write_bundle
+from selfmotion.planning.result.continuity import (
+    CheckedMotion,
+    continuity_faults,
+    end_position_faults,
+)
+from selfmotion.planning.result.equality import arm_differences, comparison_times, same_poses
 from selfmotion.planning.result.move import Move
 from selfmotion.planning.result.plan import Plan, reached_text
-from selfmotion.planning.result.specification import (
-    CheckedMotion,
-    MotionSpecification,
-    another_tool,
-    elsewhere,
-    follows_at,
-    gaps,
-    looked_at,
-    not_judged_by,
-)
+from selfmotion.planning.result.specification import MotionSpecification, missing_constraints
 from selfmotion.problem.problem import (
     START_TOLERANCE,
     Problem,
@@ -290,7 +287,7 @@ class PartsAsked:
         if is_first and start is not None:
             # The correction of a start given near the path.
             first = CheckedMotion("it", plan.trajectory)
-            yield from elsewhere(problem.robot, first, 0, start, START_TOLERANCE)
+            yield from end_position_faults(problem.robot, first, 0, start, START_TOLERANCE)
 
     def _of_moves(self) -> Iterator[str]:
         parts, problem = self._parts, self._problem
@@ -303,10 +300,10 @@ class PartsAsked:
         required = (*at_all_times(problem.constraints), *problem.clearances)
         kept = [item for item in required if item.applies(problem.robot)]
         for number, move in enumerate(moves, 1):
-            for text in another_tool(move.robot, problem.robot):
+            for text in arm_differences(move.robot, problem.robot):
                 yield f"move {number}: {text}"
             if move.trajectory is not None:
-                for text in not_judged_by(move.constraints, kept):
+                for text in missing_constraints(move.constraints, kept):
                     yield f"move {number}: {text}"
         pieces = []
         for number, plan in enumerate(plans, 1):
@@ -319,12 +316,12 @@ class PartsAsked:
         found = [motion_ for motion_ in pieces if motion_ is not None]
         # A missing move has a message already.
         if len(found) == len(pieces):
-            yield from gaps(problem.robot, found)
+            yield from continuity_faults(problem.robot, found)
 
 
 def _is_part(part: Path, whole: Path, ends: tuple[float, float]) -> bool:
     """Whether a path is another one from one of its times to another, or slower."""
-    t = looked_at(part)
+    t = comparison_times(part)
     first, last = ends
     passed = part.pace(t) if isinstance(part, Retimed) else t
     # A gap at either end is bridged by a move.
@@ -333,4 +330,4 @@ def _is_part(part: Path, whole: Path, ends: tuple[float, float]) -> bool:
         return False
     if isinstance(part, Retimed) and not np.all(part.pace(t, 1) <= _OWN_PACE):
         return False
-    return follows_at(part, t, whole, np.clip(first + passed, first, last))
+    return same_poses(part, t, whole, np.clip(first + passed, first, last))

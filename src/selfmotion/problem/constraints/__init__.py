@@ -53,7 +53,6 @@ from selfmotion.problem.constraints.limits import (
     JointAccelerationLimits as JointAccelerationLimits,
     JointJerkLimits as JointJerkLimits,
     JointPositionLimits as JointPositionLimits,
-    JointTorqueLimits as JointTorqueLimits,
     JointVelocityLimits as JointVelocityLimits,
 )
 from selfmotion.problem.constraints.position_dependent import (
@@ -61,6 +60,7 @@ from selfmotion.problem.constraints.position_dependent import (
 )
 from selfmotion.problem.constraints.tilt import Tilt as Tilt
 from selfmotion.problem.constraints.tool import ToolLimits as ToolLimits
+from selfmotion.problem.constraints.torque_limits import JointTorqueLimits as JointTorqueLimits
 
 __all__ = [
     "ActiveConstraint",

@@ -39,7 +39,7 @@ from selfmotion.problem.costs.penalties import (
 )
 from selfmotion.problem.costs.reversals import JointReversals as JointReversals
 from selfmotion.problem.costs.samples import (
-    PlacedLater as PlacedLater,
+    LazySamples as LazySamples,
     Samples as Samples,
     TipSamples as TipSamples,
 )

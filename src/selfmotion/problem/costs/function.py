@@ -1,4 +1,4 @@
-"""Any integrand that a user can write down."""
+"""A cost by a function of the user: any integrand of (q̇, q, t)."""
 
 from __future__ import annotations
 
@@ -39,10 +39,11 @@ class FunctionCost(Cost):
     def __post_init__(self) -> None:
         check_name(self.name)
         for field in ("g", "g_gradient"):
-            given = getattr(self, field)
-            if not callable(given) and not (given is None and field == "g_gradient"):
+            function = getattr(self, field)
+            is_missing = function is None and field == "g_gradient"
+            if not callable(function) and not is_missing:
                 raise ProblemError(
-                    f"cost '{self.name}': {field} is {shown(given)}, expected a function of "
+                    f"cost '{self.name}': {field} is {shown(function)}, expected a function of "
                     f"(qd, q, t)"
                 )
 
@@ -63,13 +64,13 @@ class FunctionCost(Cost):
                     )
             return Partials(q=by_q, qd=by_qd)
         return Partials(
-            q=self._difference(q, lambda shifted: self._call(qd, shifted, t)),
-            qd=self._difference(qd, lambda shifted: self._call(shifted, q, t)),
+            q=self._central_differences(q, lambda shifted: self._call(qd, shifted, t)),
+            qd=self._central_differences(qd, lambda shifted: self._call(shifted, q, t)),
         )
 
     @override
     def to_dict(self) -> dict[str, Any]:
-        """Return that there was a function: a file carries none."""
+        """Return the name of the cost, and that it was a function, which no file carries."""
         return {"kind": LostCost.kind, "name": self.name, "was": self.kind}
 
     def _call(self, qd: Array, q: Array, t: Array) -> Array:
@@ -84,7 +85,8 @@ class FunctionCost(Cost):
         return value
 
     @staticmethod
-    def _difference(x: Array, function: Callable[[Array], Array]) -> Array:
+    def _central_differences(x: Array, function: Callable[[Array], Array]) -> Array:
+        """Return ∂f/∂x (S, n) of a function of x (S, n), sample by sample."""
         gradient = np.empty_like(x)
         for i in range(x.shape[1]):
             # The cube root of the rounding error balances it against the truncation error.

@@ -40,10 +40,10 @@ class TipSamples:
     error: Array
 
     def __post_init__(self) -> None:
-        _show(self, tuple(self.__dataclass_fields__))
+        _make_read_only(self, tuple(self.__dataclass_fields__))
 
     def at(self, rows: Ints) -> TipSamples:
-        """Return those of some of the times."""
+        """Return the samples at some of the times."""
         return TipSamples(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
@@ -51,7 +51,7 @@ class TipSamples:
 class Samples:
     """A joint motion at S times, with the kinematics there of all that follows a path.
 
-    The arrays refuse to be written to. `jacobian`, `rotation`, `translation` and `task` are those
+    The arrays are read-only. `jacobian`, `rotation`, `translation` and `task` are those
     of the first tip that follows a path, which mostly is the only one; `tips` has them all.
 
     Attributes
@@ -75,7 +75,7 @@ class Samples:
     task_jacobian: Array
 
     def __post_init__(self) -> None:
-        _show(self, _ARRAYS)
+        _make_read_only(self, _ARRAYS)
 
     @classmethod
     def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> Samples:
@@ -166,38 +166,38 @@ class Samples:
         return parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
 
 
-class PlacedLater(Samples):
-    """A motion whose tips are placed when costs or constraints need them.
+class LazySamples(Samples):
+    """A motion whose forward kinematics is computed when a cost or a constraint needs it.
 
     Parameters
     ----------
     follows : Follows
     sampling : Sampling
-    given : arrays
-        By name: q and q̇ (S, n), where they are not known otherwise.
+    arrays
+        By name: q and q̇ (S, n), and their derivatives; those left out are computed.
     """
 
-    def __init__(self, follows: Follows, sampling: Sampling, **given: Array) -> None:
-        for name, value in {"sampling": sampling, "follows": follows, **given}.items():
+    def __init__(self, follows: Follows, sampling: Sampling, **arrays: Array) -> None:
+        for name, value in {"sampling": sampling, "follows": follows, **arrays}.items():
             object.__setattr__(self, name, value)
 
     @cached_property
-    def _placed(self) -> Samples:
+    def _computed(self) -> Samples:
         return Samples.along(self.follows, self.sampling, self.q, self.qd)
 
     @cached_property
     @override
     def tips(self) -> tuple[TipSamples, ...]:
-        return self._placed.tips
+        return self._computed.tips
 
     @cached_property
     @override
     def task_jacobian(self) -> Array:
-        return self._placed.task_jacobian
+        return self._computed.task_jacobian
 
 
-def _show(owner: Samples | TipSamples, names: Sequence[str]) -> None:
-    """Make arrays views of their own: the owner may go on writing, whoever is shown one may not."""
+def _make_read_only(owner: Samples | TipSamples, names: Sequence[str]) -> None:
+    """Replace arrays by read-only views: costs may not write to them, who made them still may."""
     for name in names:
         view = getattr(owner, name).view()
         view.setflags(write=False)

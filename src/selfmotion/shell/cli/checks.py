@@ -177,7 +177,7 @@ def of_problem(
     motions, program = content.ways(problem.path, problem.robot), content.program
     against = content.besides(problem.robot, problem.constraints)
     if program is not None:
-        problem = controllers.by_targets(problem)
+        problem = controllers.problem_of_targets(problem)
         begin = motions[0].of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
         if controllers.shift_note(program):

@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion.planning.result import is_move
-from selfmotion.shell.cli import jobs, options, outputs, parts, reread
+from selfmotion.shell.cli import file_kinds, jobs, options, outputs, parts
 from selfmotion.shell.cli.app import (
     FILES,
     NOT_VERIFIED,
@@ -19,6 +19,14 @@ from selfmotion.shell.cli.app import (
     print_json,
     stages,
     terminal,
+)
+from selfmotion.shell.cli.file_verification import (
+    Planned,
+    is_verified,
+    message_rate_text,
+    straight_line_text,
+    verify_file,
+    verify_motion,
 )
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import FORMS
@@ -72,22 +80,22 @@ def export(
     sound = all(kept for kept, _ in each)
     verdicts = {name: text for _, written in each for name, text in written.items()}
     streamed = [target for target in out if not files.is_program(target)]
-    if all(reread.is_message(target, form) for target in streamed):
+    if all(file_kinds.is_message(target, form) for target in streamed):
         rate = coarsest if rate is None else rate
     if coarsest is not None and not as_json:
-        terminal.print(reread.coarsest_text(coarsest), markup=False, soft_wrap=True)
+        terminal.print(message_rate_text(coarsest), markup=False, soft_wrap=True)
     _print_held(planned.robot)
     _finish(planned, rate, verdicts, sound, as_json, sampled=bool(streamed))
 
 
-def _coarsest(files: "_Files", planned: reread.Planned, rate: float | None) -> float | None:
+def _coarsest(files: "_Files", planned: Planned, rate: float | None) -> float | None:
     """Return the rate of messages that keeps a plan, where none is asked for; else None."""
     if rate is None and files.are_messages and isinstance(planned, sm.Plan):
         return controllers.coarsest_rate(planned)
     return None
 
 
-def _loaded(file: Path, *, parts: bool) -> reread.Planned:
+def _loaded(file: Path, *, parts: bool) -> Planned:
     """Return what a file holds: a program, parts, a move or a plan, the one that has `parts`."""
     planned = _read(file)
     if parts and not isinstance(planned, sm.Plan):
@@ -97,7 +105,7 @@ def _loaded(file: Path, *, parts: bool) -> reread.Planned:
     return planned
 
 
-def _read(file: Path) -> reread.Planned:
+def _read(file: Path) -> Planned:
     if file.suffix == jobs.PROGRAM:
         return sm.load_program(file)
     if file.suffix == parts.PARTS:
@@ -140,7 +148,7 @@ class _Files:
                 "--parts has no effect on programs of controllers, which move all joints of a "
                 "cell; leave it out, or give a file of another kind as well"
             )
-        if any(reread.is_of_controller(target, self.form) for target in self.targets):
+        if any(file_kinds.is_controller_file(target, self.form) for target in self.targets):
             return
         if settings is not None:
             raise sm.errors.ProblemError(
@@ -154,46 +162,44 @@ class _Files:
 
     def is_program(self, target: Path) -> bool:
         """Whether a file is a program of targets, which has no rate."""
-        return reread.is_program(target, self.form, self.asked)
+        return file_kinds.is_target_program(target, self.form, self.asked)
 
     @property
     def are_messages(self) -> bool:
         """Whether one of them is a message of ROS."""
-        return any(reread.is_message(target, self.form) for target in self.targets)
+        return any(file_kinds.is_message(target, self.form) for target in self.targets)
 
     @property
     def are_readable(self) -> bool:
         """Whether one of them can be read back as a motion."""
-        return any(reread.is_readable(target, self.form) for target in self.targets)
+        return any(file_kinds.is_readable(target, self.form) for target in self.targets)
 
     def write(
-        self, planned: reread.Planned, target: Path, rate: float | None, coarsest: float | None
+        self, planned: Planned, target: Path, rate: float | None, coarsest: float | None
     ) -> tuple[bool, dict[str, str]]:
         """Write a file, and one for each part; return whether all is kept, and verdicts by name."""
         given: dict[str, Any] = {"format": self.form, "force": self.force}
         sampled = not self.is_program(target)
         if sampled:
-            is_message = reread.is_message(target, self.form)
+            is_message = file_kinds.is_message(target, self.form)
             given["rate"] = coarsest if rate is None and is_message else rate
         together: dict[str, Path] = {}
         if self.parts and sampled and isinstance(planned, sm.Plan):
             together = sm.files.write_parts(planned, target, **given)
-        own = self.asked if reread.is_of_controller(target, self.form) else None
+        own = self.asked if file_kinds.is_controller_file(target, self.form) else None
         # What only programs of targets are asked for is not of a stream of samples beside them.
         if own is not None and sampled and any(map(self.is_program, self.targets)):
             own = own.streamed
         with StageDisplay(stages) as display:
             sm.files.write_motion(planned, target, settings=own, progress=display.stage, **given)
-        sound, verdict = reread.read_back(
-            planned, target, self.form, rate, self.asked, whole=self.whole
-        )
+        sound, verdict = verify_file(planned, target, self.form, rate, self.asked, whole=self.whole)
         verdicts = {str(target): verdict}
         if together and isinstance(planned, sm.Plan):
             names = ", ".join(map(str, together.values()))
             verdicts[names] = ""
-            if reread.is_readable(target, self.form):
+            if file_kinds.is_readable(target, self.form):
                 motion = sm.files.read_parts(together)
-                kept, verdicts[names] = reread.judged(planned, motion, whole=self.whole)
+                kept, verdicts[names] = verify_motion(planned, motion, whole=self.whole)
                 sound &= kept
         return sound, verdicts
 
@@ -235,11 +241,11 @@ def _print_held(robot: sm.RobotModel) -> None:
         stages.print(f"note: {text}", markup=False, soft_wrap=True)
 
 
-def _check_verified(planned: reread.Planned, force: bool, as_json: bool) -> None:
+def _check_verified(planned: Planned, force: bool, as_json: bool) -> None:
     """End with one line where a motion is not verified, or moves at an end, and is not forced."""
     if force:
         return
-    if reread.verified(planned):
+    if is_verified(planned):
         verdict = controllers.moving_ends(planned)
         if not verdict:
             return
@@ -254,7 +260,7 @@ def _check_verified(planned: reread.Planned, force: bool, as_json: bool) -> None
 
 
 def _finish(
-    planned: reread.Planned,
+    planned: Planned,
     rate: float | None,
     verdicts: dict[str, str],
     sound: bool,
@@ -275,7 +281,7 @@ def _finish(
         outputs.print_large(Path(name), terminal, given_rate=rate is not None)
     if deviation is not None:
         terminal.print(
-            reread.straight_text(deviation),
+            straight_line_text(deviation),
             markup=False,
             soft_wrap=True,
         )

@@ -12,9 +12,14 @@ import selfmotion as sm
 from selfmotion import basics
 from selfmotion.certificate import Extreme
 from selfmotion.model.task import SE3
-from selfmotion.shell.cli import reread, result_json, summaries, tables
+from selfmotion.shell.cli import file_kinds, result_json, summaries, tables
 from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
 from selfmotion.shell.cli.documents import DocumentOptions
+from selfmotion.shell.cli.file_verification import (
+    message_rate_text,
+    straight_line_text,
+    verify_file,
+)
 from selfmotion.shop import controllers
 
 
@@ -90,15 +95,17 @@ def _print_written(
 ) -> bool:
     """Tell which files were written, and what motions in them are when they are read back."""
     sampled = [
-        file for file in files if is_motion(file) and not reread.is_program(file, None, None)
+        file
+        for file in files
+        if is_motion(file) and not file_kinds.is_target_program(file, None, None)
     ]
-    messages = [file for file in sampled if reread.is_message(file, None)]
+    messages = [file for file in sampled if file_kinds.is_message(file, None)]
     coarsest = controllers.coarsest_rate(result) if messages else None
     sound = True
     for file in files:
         verdict = ""
         if is_motion(file):
-            kept, verdict = reread.read_back(result, file, None, None, None, whole=whole)
+            kept, verdict = verify_file(result, file, None, None, None, whole=whole)
             sound &= kept
         if not quiet:
             text = f"wrote {file}{verdict and '; '}{verdict}"
@@ -106,9 +113,9 @@ def _print_written(
             print_large(file, console)
     if sampled and not quiet:
         rate = coarsest if messages == sampled else None
-        told = [reread.coarsest_text(coarsest)] if coarsest is not None else []
-        told.append(reread.straight_text(controllers.linear_deviation(result, rate)))
-        for text in told:
+        texts = [message_rate_text(coarsest)] if coarsest is not None else []
+        texts.append(straight_line_text(controllers.linear_deviation(result, rate)))
+        for text in texts:
             console.print(text, markup=False, soft_wrap=True)
     return sound
 

@@ -10,7 +10,7 @@ from numba.core import event
 
 import selfmotion as sm
 from selfmotion.basics import ALL_WORKS, compile_in_background
-from selfmotion.realtime.warm import Compiled, small_works
+from selfmotion.realtime.warm import CompilationCounter, small_works
 from selfmotion.shell.cli import options, outputs, summaries, tables
 from selfmotion.shell.cli.app import (
     BEGIN,
@@ -95,13 +95,13 @@ def study(
 def warm_up() -> None:
     """Compile all numerical kernels now, once per machine, so that no plan waits for them."""
     began = time.perf_counter()
-    counted, other = Compiled(), compile_in_background(ALL_WORKS)
-    with event.install_listener("numba:compile", counted), StageDisplay(stages) as display:
+    counter, other = CompilationCounter(), compile_in_background(ALL_WORKS)
+    with event.install_listener("numba:compile", counter), StageDisplay(stages) as display:
         works = list(small_works())
         for number, (name, work) in enumerate(works):
             display.stage(f"kernels for {name}", number + 1, len(works))
             work()
-    count = counted.count + (0 if other is None else int(other.communicate()[0] or 0))
+    count = counter.count + (0 if other is None else int(other.communicate()[0] or 0))
     seconds = time.perf_counter() - began
     outcome = "nothing was left to compile" if not count else f"{count} kernels"
     terminal.print(f"{outcome}, {seconds:.0f} s", markup=False)

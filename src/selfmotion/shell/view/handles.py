@@ -12,7 +12,7 @@ from selfmotion.model.task import SE3
 from selfmotion.problem.problem import Problem
 from selfmotion.shell.replay import GHOST, ROBOT, Json, joint_name, safe
 from selfmotion.shell.view.document import Keys, at, is_job
-from selfmotion.shell.view.poses import read_pose, rounded, write_pose
+from selfmotion.shell.view.poses import read_pose, rounded_position, write_pose
 
 # Of more waypoints none is dragged: they would hide the path.
 _MAX_WAYPOINTS = 40
@@ -103,7 +103,9 @@ def dragged(document: Mapping[str, Any], handle: Handle, shown: SE3) -> dict[Key
         return {}
     match handle.kind:
         case "waypoint":
-            values: dict[Keys, Any] = {handle.keys: rounded(pose.translation, str(handle.keys[-2]))}
+            values: dict[Keys, Any] = {
+                handle.keys: rounded_position(pose.translation, str(handle.keys[-2]))
+            }
         case "path":
             values = _moved_shape(document, handle, pose)
         case _:
@@ -208,7 +210,9 @@ def _moved_shape(document: Mapping[str, Any], handle: Handle, pose: SE3) -> dict
     for key in ("center", "center_mm"):
         if key in path:
             scale = 1e-3 if key.endswith("_mm") else 1.0
-            values[(*keys, key)] = rounded(scale * np.array(path[key], dtype=np.float64) + by, key)
+            values[(*keys, key)] = rounded_position(
+                scale * np.array(path[key], dtype=np.float64) + by, key
+            )
     if "end" in path:
         end = read_pose(path["end"])
         turn = before.rotation.T @ pose.rotation

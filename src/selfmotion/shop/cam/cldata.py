@@ -394,7 +394,7 @@ class _Reader:
         if "DEEP" in cycle or "BRKC" in cycle:
             others = next((cycle[word] for word in _STEPS if word in cycle), 0.0)
             first = cycle.get("1STPECK", others)
-            pecks = Pecks(unit * first, unit * others, is_out="DEEP" in cycle)
+            pecks = Pecks(unit * first, unit * others, retracts_fully="DEEP" in cycle)
         waits = cycle.get("DWELL", 0.0) > 0.0
         # Height between holes: as stated, or that before the cycle.
         level = max(height, unit * cycle.get("RTRCTO", 0.0))

@@ -1,22 +1,30 @@
-"""Drilling cycles: holes, down at the feed and straight out."""
+"""Drilling cycles of G-code and APT: down at the feed, in one go or by pecks, and out."""
 
 from typing import NamedTuple
 
 from selfmotion.basics import Array
 from selfmotion.shop.cam.cuts import SAME_POSE, Machine
 
-# Distance of the tool from the bottom of a hole that is there already, or comes back to break
-# chips [m].
-_OFF = 5e-4
+# Distance from the depth drilled so far to which the tool returns in a rapid, and which it retracts
+# to break chips [m].
+_CHIP_CLEARANCE = 5e-4
 _MAX_PECKS = 10_000
 
 
 class Pecks(NamedTuple):
-    """Peck cycle of a deep hole: depth of a peck [m], and full or partial retraction between."""
+    """Peck cycle of a deep hole.
+
+    Attributes
+    ----------
+    first, others : float
+        Depth of the first peck, and of the others [m].
+    retracts_fully : bool
+        Whether the tool leaves the hole after each peck, not only breaks the chip.
+    """
 
     first: float
     others: float
-    is_out: bool
+    retracts_fully: bool
 
 
 def drill(
@@ -31,21 +39,21 @@ def drill(
 ) -> None:
     """Drill a hole: from a place above it to its bottom and back.
 
-    Out, and down again where the hole is there already, it goes in rapids.
+    The tool leaves the hole in rapids, and returns in them as far as it has drilled.
 
     Parameters
     ----------
     machine : Machine
-        Whose line is read; its feed is that of the cut.
+        The machine whose line is read; the cut is at its feed.
     above, bottom : (3,)
-        Where the feed begins, and the bottom [m].
+        Where the cut begins, and the bottom of the hole [m].
     axis : (3,)
-        From the bottom to above it.
+        Unit vector from the bottom to above the hole.
     pecks : Pecks, optional
     dwell : str
-        What happens at the bottom, if anything.
+        Event at the bottom; "" for none.
     feeds_out : bool
-        Whether it comes out at the feed, not faster.
+        Whether the tool leaves the hole at the feed, not in a rapid.
 
     Raises
     ------
@@ -61,9 +69,9 @@ def drill(
     done = 0.0
     for reached in _depths(machine, depth, pecks):
         if done > 0.0:
-            if pecks is not None and pecks.is_out:
+            if pecks is not None and pecks.retracts_fully:
                 machine.rapid(above, axis)
-            machine.rapid(above - max(0.0, done - _OFF) * axis, axis)
+            machine.rapid(above - max(0.0, done - _CHIP_CLEARANCE) * axis, axis)
         machine.cut(above - reached * axis, axis)
         done = reached
     if dwell:
@@ -76,15 +84,15 @@ def drill(
 
 
 def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
-    """Return how deep it is after each peck."""
+    """Return the depth after each peck [m]."""
     if pecks is None:
         return [depth]
     if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _MAX_PECKS:
         raise machine.fault(
             f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
         )
-    depths, here = list[float](), pecks.first
-    while here < depth - SAME_POSE:
-        depths.append(here)
-        here += pecks.others
+    depths, reached = list[float](), pecks.first
+    while reached < depth - SAME_POSE:
+        depths.append(reached)
+        reached += pecks.others
     return [*depths, depth]

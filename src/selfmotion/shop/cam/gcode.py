@@ -436,7 +436,7 @@ class _Reader:
         pecks = None
         if self._cycle in ("G73", "G83"):
             step = self._unit * self._hole.get("Q", 0.0)
-            pecks = Pecks(step, step, is_out=self._cycle == "G83")
+            pecks = Pecks(step, step, retracts_fully=self._cycle == "G83")
         waits = self._cycle in ("G82", "G89") and self._hole.get("P", 0.0) > 0.0
         if np.isfinite(self._at[2]):
             # Over the hole at the height where it is, or where the hole begins if that is above.
@@ -527,7 +527,7 @@ class _Reader:
         rotary = self._rotary
         if rotary is None or self._tip or np.isnan(start).any():
             return [(self._part(goal), axis)]
-        count = rotary.count(start, goal, before, self._turns)
+        count = rotary.chord_count(start, goal, before, self._turns)
         found = []
         for k in range(1, count):
             share = k / count

@@ -1,6 +1,5 @@
-"""Tables and arrays of poses: the names, units and orientations of their columns."""
+"""Reader of tables and arrays of poses."""
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -12,25 +11,20 @@ from selfmotion.basics import (
     TURN,
     Array,
     FileFormatError,
-    nearest,
     read_arrays,
     read_rows,
 )
+from selfmotion.shop.cam.column_names import (
+    EVENT,
+    ORIENTATION_COLUMNS,
+    POSITION,
+    SEAM,
+    column_name,
+    kuka_titles,
+    si_column,
+)
 from selfmotion.shop.cam.pose_rows import PoseRows, Reading
 
-_POSITION = ("x", "y", "z")
-# Column with the name of a row's seam.
-SEAM = "seam"
-# Column with the events at a row.
-EVENT = "event"
-# Columns of an orientation → its key in `ORIENTATIONS`.
-_ORIENTATIONS: Mapping[tuple[str, ...], str] = {
-    ("qw", "qx", "qy", "qz"): "quaternion",
-    ("rx", "ry", "rz"): "rotation_vector",
-    ("roll", "pitch", "yaw"): "rpy",
-    ("nx", "ny", "nz"): "normal",
-}
-_NAMES = {"t", "feed", *_POSITION, *(name for names in _ORIENTATIONS for name in names)}
 # Columns of a table without a header, by their number.
 _DEFAULT_HEADERS = {
     3: "x,y,z",
@@ -41,54 +35,15 @@ _DEFAULT_HEADERS = {
 }
 # Columns of an array, by their number, unless options name them.
 _ARRAY_COLUMNS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
-
-# Other spellings of names.
-# Units in brackets behind a title → what its name ends in.
-_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
-_BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
-_BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
-_TITLE_WITH_UNIT = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
-_SYNONYMS = {"time": "t", "timestamp": "t"}
-# Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
-_POSITION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
-_QUATERNION_TITLES = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
-# Columns of a frame of KUKA's → their names here.
-_KUKA_TITLES = {
-    "a": "yaw_deg",
-    "b": "pitch_deg",
-    "c": "roll_deg",
-    "x": "x_mm",
-    "y": "y_mm",
-    "z": "z_mm",
-}
 _KUKA_NOTE = (
     "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
     "where they say no unit"
 )
-# Names of orientations that are refused, by makers of controllers → their names here.
-_MAKERS_TITLES = {
-    **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
-    **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
-    **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
-}
-# The first word of a program.
-_GCODE_WORD = re.compile(r"[gmn][0-9]+|%")
-# Names that are offered as spelling suggestions.
-_SUGGESTED = ("feed", "roll", "pitch", "yaw", SEAM, EVENT)
-
-# Units.
-# Ending of a name → the columns that may have it, and the unit [m]; None for degrees.
-_UNITS = {
-    "_mm": ((*_POSITION, "feed"), 1e-3),
-    "_cm": ((*_POSITION, "feed"), 1e-2),
-    "_in": ((*_POSITION, "feed"), 25.4e-3),
-    "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None),
-}
 _ROTATION_VECTOR = ("rx", "ry", "rz")
 # Columns without a unit → the unit that is taken, and the ending for another one.
 _DEFAULT_UNITS = {
     "t": ("seconds", ""),
-    **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
+    **dict.fromkeys(POSITION, ("metres", "x_mm, x_cm, x_in")),
     "feed": ("m/s", "feed_mm"),
     **dict.fromkeys(("roll", "pitch", "yaw"), ("radians about fixed axes", "roll_deg")),
     **dict.fromkeys(_ROTATION_VECTOR, ("radians", "rx_deg")),
@@ -108,8 +63,8 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
     with_unit = set[str]()
 
-    def normalised(title: str) -> str:
-        """Return the column's name for a title, and record titles that state a unit."""
+    def read_title(title: str) -> str:
+        """Return the name of a column for its title; record those whose title states a unit."""
         name = column_name(title)
         if "[" in title or "(" in title:
             with_unit.add(name)
@@ -118,9 +73,9 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     header, table, lines, texts = read_rows(
         file,
         (SEAM, EVENT),
-        check=lambda names: [_si_column(file, name) for name in _kuka_titles(names)],
+        check=lambda names: [si_column(file, name) for name in kuka_titles(names)],
         columns=None if reading is None else reading.columns,
-        named=normalised,
+        named=read_title,
         usual=_DEFAULT_HEADERS,
     )
     labels = [f"line {number}" for number in lines]
@@ -152,13 +107,13 @@ def rows_of_table(
     Columns `with_unit` have a unit in the title, though not in their name.
     """
     notes: tuple[str, ...] = ()
-    if (titles := _kuka_titles(header)) != list(header):
+    if (titles := kuka_titles(header)) != list(header):
         _check_millimetres(file, header, table)
         header, notes = titles, (_KUKA_NOTE,)
-    columns = _columns(file, header, table)
+    columns = _si_columns(file, header, table)
     notes += _units_note([title for title in header if title not in with_unit])
     events = texts.get(EVENT, [""] * len(labels))
-    missing = [name for name in _POSITION if name not in columns]
+    missing = [name for name in POSITION if name not in columns]
     if missing:
         raise FileFormatError(
             f"{file}: column '{missing[0]}' is missing; the header is "
@@ -168,7 +123,7 @@ def rows_of_table(
     orientation, values, orientation_notes = _orientations(file, header, columns, labels)
     return PoseRows(
         labels,
-        np.stack([columns[name] for name in _POSITION], axis=1),
+        np.stack([columns[name] for name in POSITION], axis=1),
         orientation,
         values,
         columns.get("t"),
@@ -181,8 +136,8 @@ def rows_of_table(
 def _orientations(
     file: FilePath, header: Sequence[str], columns: Mapping[str, Array], labels: Sequence[str]
 ) -> tuple[str, Array, tuple[str, ...]]:
-    """Return which key of `ORIENTATIONS` a table has, "" for none, its values, and notes on it."""
-    present = [names for names in _ORIENTATIONS if set(names) & set(columns)]
+    """Return the key of an orientation in `ORIENTATIONS` ("" for none), its values, and notes."""
+    present = [names for names in ORIENTATION_COLUMNS if set(names) & set(columns)]
     if len(present) > 1:
         raise FileFormatError(
             f"{file}: has columns {','.join(present[0])} and {','.join(present[1])}; keep one "
@@ -198,43 +153,35 @@ def _orientations(
         )
     values = np.stack([columns[name] for name in names], axis=1)
     if names != _ROTATION_VECTOR:
-        return _ORIENTATIONS[names], values, ()
+        return ORIENTATION_COLUMNS[names], values, ()
     unit = "_deg" if any(column_name(title) == "rx_deg" for title in header) else ""
     angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
     _check_rotation_vectors(file, values, labels, angles)
     note = f"{_ROTATION_VECTOR_NOTE}; angles about fixed axes are called {angles}"
-    return _ORIENTATIONS[names], values, (note,)
+    return ORIENTATION_COLUMNS[names], values, (note,)
 
 
 def _units_note(titles: Sequence[str]) -> tuple[str, ...]:
-    """Return a note of columns that say no unit, and of what they are taken for."""
-    bare: dict[tuple[str, str], list[str]] = {}
+    """Return a note on the columns without a unit, with the unit that is assumed."""
+    without_unit: dict[tuple[str, str], list[str]] = {}
     for title in titles:
         if column_name(title) in _DEFAULT_UNITS:
-            bare.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(column_name(title))
-    if not bare:
+            without_unit.setdefault(_DEFAULT_UNITS[column_name(title)], []).append(
+                column_name(title)
+            )
+    if not without_unit:
         return ()
     columns = "; ".join(
         f"{','.join(names)} for {taken}{f' (else: {others})' if others else ''}"
-        for (taken, others), names in bare.items()
+        for (taken, others), names in without_unit.items()
     )
     return (f"columns say no unit and are taken so: {columns}",)
 
 
-def _kuka_titles(titles: Sequence[str]) -> list[str]:
-    """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
-    given = [column_name(title) for title in titles]
-    return (
-        [_KUKA_TITLES.get(name, name) for name in given]
-        if {"a", "b", "c"} <= set(given)
-        else [*titles]
-    )
-
-
 def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
-    """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
-    bare = [k for k, title in enumerate(titles) if column_name(title) in _POSITION]
-    if bare and len(table) and np.abs(table[:, bare]).max() < _MAX_METRES:
+    """Refuse positions beside A, B, C without a unit that are so small that they may be metres."""
+    without_unit = [k for k, title in enumerate(titles) if column_name(title) in POSITION]
+    if without_unit and len(table) and np.abs(table[:, without_unit]).max() < _MAX_METRES:
         raise FileFormatError(
             f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
             f"{_MAX_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
@@ -245,7 +192,7 @@ def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> N
 def _check_rotation_vectors(
     file: FilePath, turns: Array, labels: Sequence[str], angles: str
 ) -> None:
-    """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
+    """Refuse rotation vectors (K, 3) [rad] above half a turn: they may be roll, pitch and yaw."""
     sizes = np.linalg.norm(turns, axis=1)
     # Degrees that are taken for radians are reported as such later on.
     over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
@@ -259,66 +206,20 @@ def _check_rotation_vectors(
         )
 
 
-def column_name(title: str) -> str:
-    """Return a title as its column is called here: x_mm of "X [mm]"."""
-    name = title.strip().lower()
-    found = _TITLE_WITH_UNIT.fullmatch(name)
-    if found and found[2].strip() in _BRACKETS:
-        name = found[1] + _BRACKETS[found[2].strip()]
-    stem, unit = name, ""
-    for suffix in _UNITS:
-        if name.endswith(suffix):
-            stem, unit = name.removesuffix(suffix), suffix
-    if position := _POSITION_TITLES.fullmatch(stem):
-        stem = position[1] or position[2]
-    elif turn := _QUATERNION_TITLES.fullmatch(stem):
-        stem = f"q{turn[1]}"
-    return _SYNONYMS.get(stem, stem) + unit
-
-
 def _split_events(text: str) -> list[str]:
     """Return the events of a row, with semicolons between them."""
     return [event.strip() for event in text.split(";") if event.strip()]
 
 
-def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
-    """Return the columns in SI units, by their names without unit."""
+def _si_columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without units."""
     columns: dict[str, Array] = {}
     for k, title in enumerate(header):
-        name, scale = _si_column(file, title)
+        name, scale = si_column(file, title)
         if name in columns:
             raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
         columns[name] = scale * table[:, k]
     return columns
-
-
-def _si_column(file: FilePath, title: str) -> tuple[str, float]:
-    """Return the name of a column without its unit, and that in SI units."""
-    title = column_name(title)
-    name, scale = title, 1.0
-    for suffix, (names, factor) in _UNITS.items():
-        if title.endswith(suffix) and title.removesuffix(suffix) in names:
-            name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
-    if name in ("i", "j", "k"):
-        raise FileFormatError(
-            f"{file}: column '{name}': of machines i,j,k points out of the part; nx,ny,nz is the "
-            f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
-            f"they point out"
-        )
-    if _GCODE_WORD.match(title):
-        raise FileFormatError(
-            f"{file}: unknown column '{title}': if this is G-code, call the file .nc or .gcode"
-        )
-    if name in _MAKERS_TITLES:
-        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS_TITLES[name]}")
-    if name not in _NAMES:
-        raise FileFormatError(
-            f"{file}: unknown column '{title}'{nearest(title, _SUGGESTED)}, expected "
-            f"t, feed, seam, event, x,y,z and "
-            f"{' or '.join(','.join(names) for names in _ORIENTATIONS)}; to leave a column out, "
-            f"call it - in columns (--set path.columns=-,x,y,z)"
-        )
-    return name, scale
 
 
 def read_array(file: FilePath, reading: Reading) -> PoseRows:
@@ -348,6 +249,6 @@ def read_array(file: FilePath, reading: Reading) -> PoseRows:
             f"{file}: has shape {array.shape} and {count} are named, expected (N, 4, 4) poses, "
             f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
         )
-    chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
-    numbers = array[:, chosen] * 1.0
-    return rows_of_table(file, [columns[k] for k in chosen], numbers, labels, {})
+    used = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, used] * 1.0
+    return rows_of_table(file, [columns[k] for k in used], numbers, labels, {})

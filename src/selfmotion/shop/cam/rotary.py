@@ -1,4 +1,4 @@
-"""Rotary axes of a machine: words A, B and C, which turn its head or the table with the part."""
+"""Rotary axes A, B and C of a machine tool, which turn its head or the table with the part."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ _AXES = ("A", "B", "C")
 HEAD = "head"
 # Kind of axes that turn the table.
 TABLE = "table"
-# Largest deviation of chords from a line that a table turns [m].
+# Largest deviation of chords from a line of the machine that the table bends [m].
 _CHORD = 1e-5
 # Largest number of such chords.
 _CHORDS = 100_000
@@ -66,10 +66,10 @@ class Rotary:
         """Return the rotation (3, 3) from machine to part directions, by angles [rad]."""
         if not self.axes:
             return _about("C", turns) @ _about("B", turns) @ _about("A", turns)
-        found = np.eye(3)
+        rotation = np.eye(3)
         for axis, sign in self.axes:
-            found = _about(axis, {axis: sign * turns.get(axis, 0.0)}) @ found
-        return found
+            rotation = _about(axis, {axis: sign * turns.get(axis, 0.0)}) @ rotation
+        return rotation
 
     def in_part(self, position: Array, turns: Mapping[str, float]) -> Array:
         """Return where a position of the machine (3,) is in the part; NaN where it is not known."""
@@ -79,43 +79,57 @@ class Rotary:
             return np.full(3, np.nan)
         return np.asarray(self.center + self.rotation(turns) @ (position - self.center))
 
-    def count(
-        self, start: Array, goal: Array, turns: Mapping[str, float], then: Mapping[str, float]
+    def chord_count(
+        self,
+        start: Array,
+        goal: Array,
+        start_turns: Mapping[str, float],
+        goal_turns: Mapping[str, float],
     ) -> int:
-        """Return how many chords a line of the machine takes in the part.
+        """Return how many chords in the part replace a line of the machine.
 
-        A point R(s) p(s), with R turning by θ and p going d from it at distance r, has a second
-        derivative of at most r θ² + 2 d θ, an eighth of which is what a chord misses.
+        For s from 0 to 1 the tool is at R(s) p(s) in the part: R turns by θ, and p travels d, at a
+        distance of at most r from the axes. The second derivative is at most r θ² + 2 d θ; a chord
+        deviates by at most an eighth of it.
         """
         if self.kind == HEAD:
             return 1
-        angle = sum(abs(then.get(axis, 0.0) - turns.get(axis, 0.0)) for axis, _ in self.axes)
-        far = max(float(np.linalg.norm(point - self.center)) for point in (start, goal))
-        bend = angle * (far * angle + 2.0 * float(np.linalg.norm(goal - start)))
+        angle = sum(
+            abs(goal_turns.get(axis, 0.0) - start_turns.get(axis, 0.0)) for axis, _ in self.axes
+        )
+        radius = max(float(np.linalg.norm(point - self.center)) for point in (start, goal))
+        bend = angle * (radius * angle + 2.0 * float(np.linalg.norm(goal - start)))
         return int(np.clip(np.ceil(np.sqrt(bend / (8.0 * _CHORD))), 1, _CHORDS))
 
 
-def _axes_of(given: Any) -> tuple[tuple[str, float], ...]:
-    text = given.replace(" ", "") if isinstance(given, str) else given
-    if isinstance(text, str):
-        text = text.split(",") if "," in text else list(text) if "-" not in text else [text]
-    listed = list(text) if isinstance(text, list | tuple) else [given]
-    names = [str(item).lstrip("+-").upper() for item in listed]
+def _axes_of(value: Any) -> tuple[tuple[str, float], ...]:
+    """Return names and signs of axes: of ``"BC"``, ``"B,-C"`` or ``["B", "-C"]``."""
+    if isinstance(value, str):
+        items = _split(value.replace(" ", ""))
+    else:
+        items = list(value) if isinstance(value, list | tuple) else [value]
+    names = [str(item).lstrip("+-").upper() for item in items]
     if not set(names) <= set(_AXES) or len(set(names)) != len(names) or len(names) > 2:
         raise ValueError(
-            f"rotary_axes is {shown(given)}, expected the table's axes from the machine to the "
+            f"rotary_axes is {shown(value)}, expected the table's axes from the machine to the "
             f"part: BC or AC, or one; B,-C where C turns the table right-handed"
         )
-    signs = [-1.0 if str(item).startswith("-") else 1.0 for item in listed]
+    signs = [-1.0 if str(item).startswith("-") else 1.0 for item in items]
     return tuple(zip(names, signs, strict=True))
 
 
+def _split(text: str) -> list[str]:
+    if "," in text:
+        return text.split(",")
+    return [text] if "-" in text else list(text)
+
+
 def _about(axis: str, turns: Mapping[str, float]) -> Array:
-    """Return the rotation about an axis by its angle [rad]."""
+    """Return the rotation (3, 3) about an axis by its angle [rad]."""
     angle, k = turns.get(axis, 0.0), _AXES.index(axis)
     i, j = (k + 1) % 3, (k + 2) % 3
-    found = np.eye(3)
-    found[i, i] = found[j, j] = np.cos(angle)
-    found[j, i] = np.sin(angle)
-    found[i, j] = -found[j, i]
-    return found
+    rotation = np.eye(3)
+    rotation[i, i] = rotation[j, j] = np.cos(angle)
+    rotation[j, i] = np.sin(angle)
+    rotation[i, j] = -rotation[j, i]
+    return rotation

@@ -60,7 +60,7 @@ from selfmotion.shop.controllers.shifted_work_objects import (
 from selfmotion.shop.controllers.step_judging import worst_certificate as worst_certificate
 from selfmotion.shop.controllers.switching_faults import switching_faults as switching_faults
 from selfmotion.shop.controllers.target_constraints import (
-    by_targets as by_targets,
     constraints_of_lines as constraints_of_lines,
+    problem_of_targets as problem_of_targets,
 )
 from selfmotion.shop.controllers.work_objects import base_rotation_note as base_rotation_note

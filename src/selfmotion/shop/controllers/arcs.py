@@ -1,11 +1,11 @@
 r"""Circular steps between tool poses, as ``SCIRC``, ``MoveC`` and ``movec`` make them.
 
-The position goes along the circle through the begin, a via point and the end, evenly. The
-orientation turns from that of the begin to that of the end about one axis evenly, relative to the
-work object, and external axes are linear, as in a straight step. The makers document that
+The position moves evenly along the circle through the start, a via point and the end. The
+orientation turns evenly about one axis from that of the start to that of the end, relative to the
+work object. External axes are linear, as in a straight step. The makers document that
 orientation for ``$CIRC_TYPE = #BASE`` (KUKA), ``CirPathMode \ObjectFrame`` (ABB) and ``mode=0``
-(Universal Robots). A via pose is in the middle of its step in all of that, so that a controller
-that heeds its orientation does the same.
+(Universal Robots). Via poses are in the middle of their steps, in orientation and external axes as
+well, so that a controller that takes their orientation into account moves in the same way.
 """
 
 from typing import NamedTuple
@@ -30,11 +30,11 @@ class Arc(NamedTuple):
     Attributes
     ----------
     center, axis : (3,)
-        It goes right-handed about the axis.
+        The arc is right-handed about the axis.
     arm : (3,)
-        From the centre to the begin [m].
+        From the centre to the start [m].
     angle : float
-        How far it goes [rad].
+        From the start to the end [rad].
     """
 
     center: Array
@@ -48,42 +48,42 @@ class Arc(NamedTuple):
         return self.angle * float(np.linalg.norm(self.arm))
 
     @property
-    def is_meant(self) -> bool:
-        """Whether controllers make a step of it."""
+    def is_programmable(self) -> bool:
+        """Whether all controllers accept it as a circular motion."""
         return MIN_TURN <= self.angle <= MAX_TURN and self.length >= MIN_LENGTH
 
     def at(self, share: Array) -> Array:
-        """Return points at shares of it (K,), (K, 3)."""
-        turned = (self.angle * share)[:, None]
+        """Return the points at shares of the arc (K,), from 0 to 1, (K, 3) [m]."""
+        angles = (self.angle * share)[:, None]
         across = np.cross(self.axis, self.arm)
-        return np.asarray(self.center + np.cos(turned) * self.arm + np.sin(turned) * across)
+        return np.asarray(self.center + np.cos(angles) * self.arm + np.sin(angles) * across)
 
 
-def arc_through(begin: Array, via: Array, end: Array) -> Arc | None:
-    """Return the arc from a point by another to a third (3,); None where they are on a line."""
-    first, second = via - begin, end - begin
+def arc_through(start: Array, via: Array, end: Array) -> Arc | None:
+    """Return the arc from a point (3,) through another to a third; None for points on a line."""
+    first, second = via - start, end - start
     axis = np.cross(first, second)
     size, chord = float(np.linalg.norm(axis)), float(np.linalg.norm(second))
     if size <= _FLAT * max(chord, float(np.linalg.norm(first))) ** 2:
         return None
-    # The circumcentre, from the begin.
+    # The circumcentre, from the start.
     away = np.cross(axis, first) * (second @ second) + np.cross(second, axis) * (first @ first)
     away = away / (2.0 * size**2)
     axis = axis / size
     arm = -away
-    last = end - begin - away
+    last = end - start - away
     angle = float(np.arctan2(np.cross(arm, last) @ axis, arm @ last)) % (2.0 * np.pi)
-    return Arc(begin + away, axis, arm, angle)
+    return Arc(start + away, axis, arm, angle)
 
 
 def step_lengths(positions: Array, vias: Array) -> Array:
-    """Return how long the steps between places (K + 1, 3) are, (K,) [m].
+    """Return the lengths of steps between positions, along arcs where they are circular, (K,) [m].
 
     Parameters
     ----------
     positions : (K + 1, 3)
     vias : (K, 3)
-        Where a step goes round; no numbers where it goes straight.
+        Via points of circular steps; NaN for straight ones.
     """
     lengths = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     for k in np.flatnonzero(np.isfinite(vias[:, 0])):
@@ -93,10 +93,22 @@ def step_lengths(positions: Array, vias: Array) -> Array:
 
 
 def put_on_arcs(rows: Array, times: Array, t: Array, positions: Array, vias: Array) -> None:
-    """Put the positions of rows (N, 3 + …) at times where steps go round, in place."""
+    """Move the positions of rows (N, 3 + …) onto the arcs of circular steps, in place.
+
+    Parameters
+    ----------
+    rows : (N, 3 + …)
+        Begin with positions [m].
+    times : (N,)
+        Of the rows [s].
+    t : (K + 1,)
+        Of the positions, between which the steps are [s].
+    positions, vias
+        See `step_lengths`.
+    """
     step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     for k in np.flatnonzero(np.isfinite(vias[:, 0])):
         arc = arc_through(positions[k], vias[k], positions[k + 1])
-        here = step == k
-        if arc is not None and here.any():
-            rows[here, :3] = arc.at((times[here] - t[k]) / (t[k + 1] - t[k]))
+        in_step = step == k
+        if arc is not None and in_step.any():
+            rows[in_step, :3] = arc.at((times[in_step] - t[k]) / (t[k + 1] - t[k]))

@@ -249,7 +249,7 @@ class FeedSection(PoseSection):
             via = self.rounding(via[None], quaternions[[k]])[0][0]
             arc = arc_through(positions[k], via, positions[k + 1])
             # A halved step may be too short for an arc: it is linear then.
-            if arc is not None and arc.is_meant:
+            if arc is not None and arc.is_programmable:
                 vias[k] = via
         joints, arrived = self.frames.inverse_kinematics(
             positions, quaternions, self._mixed(along.q[ends], q)

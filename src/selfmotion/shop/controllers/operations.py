@@ -12,7 +12,7 @@ from selfmotion.model.path import REST_SPEED, FeedProfile, Path
 from selfmotion.model.robot import Chain
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Move, Parts, Plan
-from selfmotion.shop.controllers.target_constraints import by_targets
+from selfmotion.shop.controllers.target_constraints import problem_of_targets
 from selfmotion.work.job import Program
 
 # Largest deviation of a free move [m, rad].
@@ -109,7 +109,7 @@ def _plan_operation(name: str, plan: Plan) -> Operation:
     items, requirements = plan.problem.follows.items, plan.requirements
 
     def is_valid(motion: Trajectory, within: Tolerance) -> bool:
-        return by_targets(plan.problem).certify(motion, within).verified
+        return problem_of_targets(plan.problem).certify(motion, within).verified
 
     relaxed_rows = {row for item in plan.problem.relaxations for row in item.rows}
     return Operation(

@@ -236,7 +236,7 @@ class StepSearch:
         if is_circular:
             via = self.samples.middle(first, last)
             arc = arc_through(rows[first, :3], via, rows[last, :3])
-            if arc is None or not arc.is_meant:
+            if arc is None or not arc.is_programmable:
                 return None
             put_on_arcs(step_rows, travel[section], travel[ends], rows[ends, :3], via[None])
         return step_rows

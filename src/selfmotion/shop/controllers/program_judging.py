@@ -15,7 +15,7 @@ from selfmotion.basics import ProblemError, RobotError
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory, part_of_motion
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.result import CheckedMotion, elsewhere, gaps
+from selfmotion.planning.result import CheckedMotion, continuity_faults, end_position_faults
 from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.pose_numbers import JOINT_ROUNDING, TIME_TOLERANCE
@@ -78,7 +78,7 @@ def judge_program(
     sequence, rounding = _motion_sequence(job, motions), _end_rounding(program)
     failures = (
         *_job_faults(job),
-        *gaps(job.robot, sequence, rounding),
+        *continuity_faults(job.robot, sequence, rounding),
         *_end_faults(job, sequence, rounding, _unshifted_ends(program)),
         *([program.start_fault] if program.start_fault else []),
         *switching_faults(program, job),
@@ -115,7 +115,7 @@ def judge_motion(motion: Trajectory, job: Program) -> ProgramVerdict:
     sequence = _motion_sequence(job, motions)
     failures = (
         *_job_faults(job),
-        *gaps(job.robot, sequence),
+        *continuity_faults(job.robot, sequence),
         *_end_faults(job, sequence, JOINT_ROUNDING),
     )
     return ProgramVerdict(steps, failures)
@@ -175,7 +175,7 @@ def _end_faults(
     for end, is_judged in zip((0, -1), judged_ends, strict=True):
         if is_judged:
             planned = job.steps[end].motion.q[end]
-            yield from elsewhere(job.robot, sequence[end], end, planned, rounding)
+            yield from end_position_faults(job.robot, sequence[end], end, planned, rounding)
 
 
 def _move_faults(

@@ -1,4 +1,4 @@
-"""Programs in ABB RAPID, written."""
+"""Writer of programs in ABB RAPID."""
 
 from pathlib import Path as FilePath
 from typing import Any
@@ -33,6 +33,11 @@ _WORDS = (
     "WITH", "XOR",
 )
 # fmt: on
+# Comment where configurations are not known.
+_UNKNOWN_CONFIGURATION = [
+    "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
+    "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
+]
 # End of the name of the procedure.
 _PROCEDURE = "_run"
 
@@ -51,9 +56,9 @@ class RapidWriter(ProgramWriter):
         data = [
             RAPID.text("begin", name=name),
             *self.head(),
-            *map(self.comment, self._unknown()),
+            *map(self.comment, self._configuration_comment()),
             self._tool(),
-            *self._work(),
+            *self._work_object(),
             self.line("speed", speed=f"{name}{SLOW}", speeds=slow),
             *(
                 self.line("speed", speed=f"{name}_f{k}", speeds=[1e3 * speed, *TURNING])
@@ -111,8 +116,8 @@ class RapidWriter(ProgramWriter):
         numbers = ", ".join(str(value) for value in (*quarters, cfx or 0))
         return super().pose(segment, k, configuration or numbers)
 
-    def _unknown(self) -> list[str]:
-        """Return the comment on configurations that are not known."""
+    def _configuration_comment(self) -> list[str]:
+        """Return a comment where the arm's configurations are not known; nothing else."""
         first = next((x for x in self.program.segments if isinstance(x, PoseSegment)), None)
         if first is None:
             return []
@@ -120,12 +125,13 @@ class RapidWriter(ProgramWriter):
         return [] if is_known else _UNKNOWN_CONFIGURATION
 
     def _tool(self) -> str:
+        """Return the tool with its load: mass [kg] and centre of mass [mm]."""
         x, y, z = (1e3 * value for value in self.draft.settings.center)
         # A draft has a mass.
         load = {"mass": self.draft.settings.mass or 0.0, "x": x, "y": y, "z": z}
         return self.line("tool", tool=f"{self.name}_t", tool_frame=self.draft.tool, **load)
 
-    def _work(self) -> list[str]:
+    def _work_object(self) -> list[str]:
         """Return the work object: in the world, or on a mechanical unit that carries it."""
         frames, name = self.draft.frames, f"{self.name}_w"
         if frames is None:
@@ -139,12 +145,6 @@ class RapidWriter(ProgramWriter):
             )
             values = {"fixed": False, "unit": unit, "user": None, "object": frames.work}
         return [self.line("work", work=name, **values)]
-
-
-_UNKNOWN_CONFIGURATION = [
-    "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
-    "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
-]
 
 
 def write_rapid(file: FilePath, draft: Draft) -> None:

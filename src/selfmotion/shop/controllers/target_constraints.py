@@ -1,4 +1,4 @@
-"""Constraints that a controller's program can keep."""
+"""Constraints that a controller's program can keep: it interpolates between targets by itself."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,21 +7,25 @@ from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
 
 
-def by_targets(problem: Problem) -> Problem:
-    """Return a problem with the constraints that targets can keep."""
+def problem_of_targets(problem: Problem) -> Problem:
+    """Return a problem with only those constraints that a program of targets can keep."""
     return replace(problem, constraints=constraints_of_targets(problem.constraints))
 
 
 def constraints_of_targets(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    """Return the constraints that targets can keep: the controller sets the accelerations."""
-    limited = (item.for_controller() for item in constraints)
-    return tuple(item for item in limited if item is not None)
+    """Return the constraints that targets can keep.
+
+    The others, such as limits of acceleration and jerk, depend on the controller.
+    """
+    kept = (item.for_controller() for item in constraints)
+    return tuple(item for item in kept if item is not None)
 
 
 def constraints_of_lines(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that straight lines between targets can keep.
 
-    Corners have no acceleration, and so no torques, which are verified along the smooth curve.
+    At their corners there is no acceleration, and so no torque: torques are verified along the
+    smooth curve instead.
     """
-    limited = (item.for_controller(lines=True) for item in constraints)
-    return tuple(item for item in limited if item is not None)
+    kept = (item.for_controller(lines=True) for item in constraints)
+    return tuple(item for item in kept if item is not None)

@@ -1,4 +1,4 @@
-"""Problems to workers, plans to a folder."""
+"""Planning of many problems by processes or an executor, into a folder that a later run resumes."""
 
 import os
 import time
@@ -28,10 +28,11 @@ from selfmotion.work.batch.folder import Folder
 from selfmotion.work.batch.items import Item, Row, problem_items
 from selfmotion.work.batch.worker import begin_process, plan_task
 
-# Each worker has this many problems at hand, so that none waits for the next one.
-_AT_HAND = 2
-# Problems that an executor of unknown size is given at a time.
+# Problems submitted per worker, so that none waits for the next one.
+_PER_WORKER = 2
+# Problems submitted at a time to an executor of unknown size.
 _WINDOW = 64
+# Environment variables that set the number of threads of linear algebra.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _Result = tuple[dict[str, Any], bytes]
 
@@ -83,8 +84,8 @@ class Batch:
     @property
     def best(self) -> Row | None:
         """The verified plan of the lowest cost, or the fastest if that was asked for; or None."""
-        sound = [row for row in self.rows if row.verified]
-        return min(sound, key=lambda row: row.rank, default=None)
+        verified = [row for row in self.rows if row.verified]
+        return min(verified, key=lambda row: row.rank, default=None)
 
 
 def plan_many(
@@ -176,13 +177,13 @@ def plan_items(
     run = _Run(folder, items, progress, deadline)
     pending = deque(items)
     if executor is not None:
-        if run.through(executor, pending, _WINDOW):
+        if run.run_on(executor, pending, _WINDOW):
             raise PlanError(
                 f"the executor broke after {len(run.rows)} of {len(items)} problems; what is "
                 f"finished is in '{folder.path}': run again to go on"
             )
     else:
-        run.on_this_machine(pending, workers or os.cpu_count() or 1)
+        run.run_on_processes(pending, workers or os.cpu_count() or 1)
     rows = tuple(run.rows[item.name] for item in items)
     folder.write_tables(rows, replays)
     return Batch(rows, folder.path, run.resumed, _write_best(items, run.rows, folder.path))
@@ -194,8 +195,10 @@ def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) ->
     for item in items:
         row = rows[item.name]
         if item.file is not None and item.write is not None and row.verified:
-            here = row, item.write
-            best[item.file] = min(best.get(item.file, here), here, key=lambda each: each[0].rank)
+            candidate = row, item.write
+            best[item.file] = min(
+                best.get(item.file, candidate), candidate, key=lambda each: each[0].rank
+            )
     written = []
     for file, (_, write) in best.items():
         target = folder / f"{file.stem}-best{file.suffix}"
@@ -205,7 +208,15 @@ def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) ->
 
 
 class _Run:
-    """One run of a batch: what is finished, and how fast it goes."""
+    """One run of a batch: the rows that are finished, and the progress.
+
+    Attributes
+    ----------
+    rows : dict
+        By the name of the item.
+    resumed : int
+        How many an earlier run had finished.
+    """
 
     def __init__(
         self,
@@ -219,31 +230,31 @@ class _Run:
         self._deadline = deadline
         self._began, self.resumed = time.monotonic(), 0
 
-    def through(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
-        """Run what is pending; return what was at work when the executor broke, if it did."""
-        flying: dict[Future[_Result], Item] = {}
-        while pending or flying:
-            while pending and len(flying) < window:
+    def run_on(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
+        """Run pending items, `window` at a time; return those at work if the executor breaks."""
+        running: dict[Future[_Result], Item] = {}
+        while pending or running:
+            while pending and len(running) < window:
                 item = pending.popleft()
                 task = self._task(item)
                 if task is None:
                     continue
                 try:
-                    flying[executor.submit(plan_task, task)] = item
+                    running[executor.submit(plan_task, task)] = item
                 except BrokenExecutor:
-                    return [*self._lost(flying), item]
-            done, _ = wait(flying, return_when=FIRST_COMPLETED)
+                    return [*self._record_finished(running), item]
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in done:
-                fault = future.exception()
-                if isinstance(fault, BrokenExecutor):
-                    return self._lost(flying)
-                item = flying.pop(future)
-                if fault is None:
+                error = future.exception()
+                if isinstance(error, BrokenExecutor):
+                    return self._record_finished(running)
+                item = running.pop(future)
+                if error is None:
                     self._finish(item, *future.result())
                 else:
-                    # The executor's own words: a worker that was lost more often than it allows.
-                    what = f"{type(fault).__name__}: {fault}"
-                    self._finish(item, {"error": what, "fault": True}, b"")
+                    # The executor's own message: a worker was lost more often than it allows.
+                    message = f"{type(error).__name__}: {error}"
+                    self._finish(item, {"error": message, "fault": True}, b"")
         return []
 
     def _task(self, item: Item) -> dict[str, Any] | None:
@@ -256,39 +267,42 @@ class _Run:
             return None
         try:
             return {**item.task, "deadline": self._deadline}
-        except SelfmotionError as wrong:
-            self._finish(item, {"error": str(wrong)}, b"")
+        except SelfmotionError as error:
+            self._finish(item, {"error": str(error)}, b"")
             return None
 
-    def on_this_machine(self, pending: deque[Item], workers: int) -> None:
-        """Run what is pending in processes; where one dies, begin again with what it left."""
+    def run_on_processes(self, pending: deque[Item], workers: int) -> None:
+        """Run pending items in processes; where one dies, start new ones for the items it left."""
         suspects: deque[Item] = deque()
         while pending or suspects:
             with processes(workers) as pool:
-                # One of these killed its worker: alone, a second death tells which.
+                # One of these killed its worker. Each runs alone: a second death says which one.
                 while suspects:
                     suspect = suspects.popleft()
-                    if self.through(pool, deque([suspect]), 1):
-                        died = "its process died twice, the second time with nothing else at work"
-                        self._finish(suspect, {"error": died, "fault": True}, b"")
+                    if self.run_on(pool, deque([suspect]), 1):
+                        message = (
+                            "its process died twice, the second time with nothing else at work"
+                        )
+                        self._finish(suspect, {"error": message, "fault": True}, b"")
                         break
                 else:
-                    suspects.extend(self.through(pool, pending, _AT_HAND * workers))
+                    suspects.extend(self.run_on(pool, pending, _PER_WORKER * workers))
 
-    def _lost(self, flying: dict[Future[_Result], Item]) -> list[Item]:
-        """Keep what had been finished when the executor broke, and return the rest."""
+    def _record_finished(self, running: dict[Future[_Result], Item]) -> list[Item]:
+        """Record the items that had been finished when the executor broke; return the others."""
         lost = []
-        for future, item in flying.items():
+        for future, item in running.items():
             if future.done() and not future.cancelled() and future.exception() is None:
                 self._finish(item, *future.result())
             else:
                 lost.append(item)
         return lost
 
-    def _finish(self, item: Item, found: dict[str, Any], archive: bytes) -> None:
+    def _finish(self, item: Item, result: dict[str, Any], archive: bytes) -> None:
+        """Record the result of an item in the folder, and report the progress."""
         file = self._folder.plan_file(item.name)
         goal = item.task["options"]["goal"] if archive else "best"
-        row = Row(item.name, item.key, file, dict(item.settings), goal=goal, **found)
+        row = Row(item.name, item.key, file, dict(item.settings), goal=goal, **result)
         self.rows[item.name] = self._folder.record(row, archive)
         item.forget()
         done, total = len(self.rows), len(self._items)

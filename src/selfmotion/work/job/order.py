@@ -7,8 +7,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints, obey_interruption
 from selfmotion.work.job.feasible_order import feasible_order
-from selfmotion.work.job.kernels import Tables, swept
 from selfmotion.work.job.stops import NO_ROUND, Round, Stops, along
+from selfmotion.work.job.two_opt import Tables, sweep
 
 # Local search for many stops: 2-opt and or-opt.
 #
@@ -127,7 +127,7 @@ def _local_optimum(stops: Stops, order: Sequence[int]) -> list[int]:
     found = np.array(order, dtype=np.int64)
     for _ in range(_SWEEPS):
         obey_interruption()
-        if not swept(found, tables):
+        if not sweep(found, tables):
             break
     return [int(stop) for stop in found]
 

@@ -17,10 +17,10 @@ from selfmotion.planning.result import (
     CheckedMotion,
     Move,
     Plan,
-    another_tool,
-    gaps,
-    moving_end,
+    arm_differences,
+    continuity_faults,
     reached_text,
+    rest_faults,
 )
 from selfmotion.problem.constraints import Clearance
 from selfmotion.work.job.program_files import write_program
@@ -185,7 +185,7 @@ class Program:
         strangers = [
             f"'{step.name}': {text}"
             for step in self.steps
-            for text in another_tool(step.made.robot, self.robot)
+            for text in arm_differences(step.made.robot, self.robot)
         ]
         if strangers:
             return tuple(strangers)
@@ -209,8 +209,8 @@ class Program:
             *((each, 0) for each in motions[:1]),
             *((each, -1) for each in motions[-1:]),
         ]:
-            yield from moving_end(self.robot, motion, end)
-        yield from gaps(self.robot, motions)
+            yield from rest_faults(self.robot, motion, end)
+        yield from continuity_faults(self.robot, motions)
 
     def _unchecked(self) -> Iterator[str]:
         """Yield steps that are not checked against an obstacle that is there by then."""

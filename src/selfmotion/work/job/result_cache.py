@@ -21,12 +21,12 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import (
     Move,
     Plan,
-    another_tool,
+    arm_differences,
     files_of,
     key_of,
     load_move,
     load_plan,
-    not_judged_by,
+    missing_constraints,
     read_kept,
     write_kept,
 )
@@ -150,11 +150,11 @@ class ResultCache:
 
 def serves(move: Move, wanted: Move, ends: Array) -> bool:
     """Whether a verified move joins ends (2, n), for arm and constraints of a `wanted` one."""
-    if move.trajectory is None or any(another_tool(move.robot, wanted.robot)):
+    if move.trajectory is None or any(arm_differences(move.robot, wanted.robot)):
         return False
     if float(np.abs(move.motion.q[[0, -1]] - ends).max()) > _JOINED:
         return False
-    return move.verified and not any(not_judged_by(move.constraints, wanted.constraints))
+    return move.verified and not any(missing_constraints(move.constraints, wanted.constraints))
 
 
 def _record(file: Path | None) -> tuple[Path, Mapping[str, Any]] | None:

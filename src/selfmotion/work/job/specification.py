@@ -19,8 +19,8 @@ from selfmotion.planning.result import (
     MotionSpecification,
     Plan,
     arm_digest,
-    elsewhere,
-    not_judged_by,
+    end_position_faults,
+    missing_constraints,
 )
 from selfmotion.problem.constraints import Clearance, Constraint, as_clearances
 from selfmotion.problem.costs import cost_from_dict
@@ -114,7 +114,7 @@ class Specification:
         for q, at in ((self.start, 0), (self.end, -1)):
             motion = CheckedMotion.of("it", steps[at].made) if steps and q is not None else None
             if motion is not None and q is not None:
-                yield from elsewhere(robot, motion, at, q)
+                yield from end_position_faults(robot, motion, at, q)
 
     def _seam(self, robot: RobotModel, step: Step, plan: Plan) -> Iterator[str]:
         """Yield where a seam's step is not what was asked for."""
@@ -145,7 +145,7 @@ class Specification:
         has_bodies = robot.urdf.has_collisions or bool(self.obstacles)
         clearances = self.clearances if has_bodies else ()
         for step in steps:
-            for text in not_judged_by(step.constraints, wanted, clearances):
+            for text in missing_constraints(step.constraints, wanted, clearances):
                 yield f"'{step.name}': {text}"
 
     def to_dict(self) -> dict[str, Any]:
