@@ -141,8 +141,8 @@ PARTS = (
         ),
         (
             "nodes/test_newton_steps.py",
-            "nodes/test_newton.py",
             "nodes/test_batch.py",
+            "nodes/test_newton.py",
             "constraints/test_limits.py",
             "planning/test_beginnings.py",
         ),

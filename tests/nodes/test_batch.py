@@ -9,6 +9,7 @@ from selfmotion.model.follow import null_basis
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, Step, batch, minimise
 from selfmotion.planning.nodes.motion import stepped
+from selfmotion.planning.nodes.settings import SETTINGS
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
 
@@ -159,4 +160,4 @@ def test_no_coordinate_changes_more_in_one_step_than_allowed(
     monkeypatch.setattr(batch, "stepped", seen)
     advanced(begin, 2)
     # Whole steps would be longer.
-    assert max(changes) == pytest.approx(batch._MAX_CHANGE)
+    assert max(changes) == pytest.approx(SETTINGS.max_change)

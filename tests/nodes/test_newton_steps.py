@@ -12,10 +12,12 @@ from selfmotion.planning.nodes.motion import moved_along
 from selfmotion.planning.nodes.newton import (
     _merit,
     _raise_merit_penalty,
+    _relative_change,
     _residuals,
     _shorter,
     _Solver,
 )
+from selfmotion.planning.nodes.newton_kernels import merit_of_rows
 from selfmotion.planning.nodes.newton_system import Change, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
@@ -229,6 +231,19 @@ def test_products_are_as_far_from_the_barrier_as_the_farthest(panda: sm.RobotMod
             setattr(solver, name, near)
 
 
+def test_the_merit_of_rows_is_that_of_its_formula() -> None:
+    """Gaps count on either side, and without rows there is nothing to count."""
+    h = np.random.default_rng(7).uniform(-1.0, 1.0, size=9)
+    s, e = np.random.default_rng(8).uniform(0.2, 0.8, size=(2, len(h)))
+    rho, mu, penalty = 3.0, 0.7, 0.4
+    gaps = h + s - e
+    assert gaps.min() < 0.0 < gaps.max()
+    expected = np.sum(rho * e - mu * (np.log(s) + np.log(e)) + penalty * np.abs(gaps))
+    assert merit_of_rows(h, s, e, rho, mu, penalty) == pytest.approx(expected, rel=SOLVED)
+    none = np.zeros(0)
+    assert merit_of_rows(none, none, none, rho, mu, penalty) == 0.0
+
+
 def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.RobotModel) -> None:
     """Slacks close all residuals; where rows hold, elastic variables are on the central path."""
     begin = bound(panda)
@@ -270,6 +285,23 @@ def test_the_unit_of_costs_changes_no_bit_of_a_step(panda: sm.RobotModel, unit: 
     assert shift == same > 0.0
     for mine, others in zip(usual, other, strict=True):
         np.testing.assert_array_equal(mine, others)
+
+
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**20])
+def test_penalties_are_in_the_unit_of_costs_and_changes_of_multipliers_in_none(
+    panda: sm.RobotModel, unit: float
+) -> None:
+    """Bit for bit where it is a power of two: of rows, and where ends have to meet."""
+    found = []
+    for each in (1.0, unit):
+        conditions = sm.constraints.JointVelocityLimits(1.0), sm.constraints.ClosedPath()
+        asked = problem(panda, *conditions, costs=[sm.costs.JointVelocity(each)])
+        solver = _Solver(nodes_of(asked, 8), None, SETTINGS.mu_first, roughly=False)
+        model, step = stepped(solver)
+        change = _relative_change(solver, step.multipliers)
+        _raise_merit_penalty(solver, model, step)
+        found.append((solver._merit_penalty / each, change))
+    assert found[0] == found[1]
 
 
 def test_no_coordinate_changes_more_in_one_step_than_allowed(
