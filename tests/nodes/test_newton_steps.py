@@ -256,6 +256,11 @@ def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.Robot
     room = solver._elastics * (solver._rho - solver._multipliers)
     holds = -h >= first / solver._multipliers
     np.testing.assert_allclose(room[holds], first, rtol=SOLVED)
+    # Where nothing is known of a row that holds, so are its slack and its multiplier.
+    unknown = known[solver._active] == 0.0
+    products = (solver._slacks * solver._multipliers)[unknown]
+    assert unknown.any()
+    np.testing.assert_allclose(products, first, rtol=DIFFERENCE)
     # Of others the violation comes on top.
     beyond = h + first / solver._multipliers
     expected = beyond + first / (solver._rho - solver._multipliers)
@@ -323,6 +328,22 @@ def test_no_coordinate_changes_more_in_one_step_than_allowed(
     assert max(changes) == pytest.approx(SETTINGS.max_change)
 
 
+def test_a_step_that_is_not_trusted_is_of_a_matrix_that_is_nearly_singular(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More is added to its diagonal until it is trusted; δ is for those not positive definite."""
+    solver = _Solver(nodes_of(problem(panda), 8), None, SETTINGS.mu_first, roughly=False)
+
+    def farthest() -> float:
+        _, step = stepped(solver)
+        return float(np.abs(step.nodes.reshape(len(step.nodes), 3, -1)[:, 0]).max())
+
+    trusted = 0.5 * farthest()
+    monkeypatch.setattr(newton_system, "SETTINGS", replace(SETTINGS, max_trusted=trusted))
+    assert 0.0 < farthest() <= trusted
+    assert solver._shift == 0.0
+
+
 def test_quadratic_convergence_spares_the_last_system(panda: sm.RobotModel) -> None:
     steps: list[Step] = []
     found = minimise(nodes_of(problem(panda), 16), lambda step: bool(steps.append(step)))
@@ -358,6 +379,42 @@ def test_where_no_step_is_accepted_conditions_may_be_the_reason(
     )
     found = minimise(nodes_of(problem(panda, constraint, costs=[Uphill()]), 16), never)
     assert found.status is Status.INFEASIBLE
+
+
+@pytest.mark.parametrize(
+    ("rise", "predicted", "status"),
+    [
+        (0.0, 0.0, None),
+        (5e-14, 0.0, None),
+        (0.25e-3, 1e-3, Status.PRECISION),
+        (0.75e-3, 1e-3, Status.GRADIENT),
+    ],
+)
+def test_where_little_is_left_a_rise_is_rounding_or_a_wrong_gradient(
+    panda: sm.RobotModel,
+    monkeypatch: pytest.MonkeyPatch,
+    rise: float,
+    predicted: float,
+    status: Status | None,
+) -> None:
+    """A step is taken up to rounding; a rise of half of the predicted fall or more tells a fault.
+
+    Of a merit function that rises along the step, and is predicted to fall, by shares of the cost.
+    """
+    solver = _Solver(nodes_of(problem(panda), 8), None, SETTINGS.mu_first, roughly=False)
+    model, step = stepped(solver)
+    solver._predicted = 0.5 * SETTINGS.rounding * solver._cost_scale
+    cost, lengths = solver.motion.objective, [0.0]
+
+    def along(motion: NodeMotion, nodes: np.ndarray, by: np.ndarray) -> NodeMotion:
+        lengths.append(float(np.linalg.norm(nodes) / np.linalg.norm(step.nodes)))
+        return motion
+
+    monkeypatch.setattr(newton, "moved_along", along)
+    monkeypatch.setattr(newton, "_merit", lambda *_: cost * (1.0 + rise * lengths[-1]))
+    monkeypatch.setattr(newton, "_raise_merit_penalty", lambda *_: -predicted * cost)
+    assert solver._line_search(model, step) is status
+    assert (len(lengths) == 2) is (status is None)
 
 
 def test_a_rejected_step_is_cut_to_the_least_of_its_parabola() -> None:
@@ -411,6 +468,8 @@ def test_from_a_neighbouring_optimum_the_finest_is_found(panda: sm.RobotModel) -
     assert rough.multipliers.max() > SETTINGS.multiplier_floor * rough.motion.cost
     assert rough.is_rough
     assert not fine.is_rough
+    # Its last μ, of all rows together, is small to what the motion costs.
+    assert np.abs(rough.multipliers * rough.motion.h).sum() <= SETTINGS.mu_warm * rough.motion.cost
     assert not minimise(begin, never).is_rough
 
 
