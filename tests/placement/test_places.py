@@ -1,5 +1,7 @@
 """What belongs to a part, as it is seen from above."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -62,10 +64,22 @@ def test_quick_looks_are_quicker_the_more_is_known() -> None:
 
 
 def test_a_quick_look_says_what_is_out_of_reach_where_nothing_is_relaxed() -> None:
-    _check_reach(seam(is_carried=False))
+    near = seam(is_carried=False)
+    _check_reach(near)
     far = seam(is_carried=False, length=3.0)
     with pytest.raises(sm.errors.InverseKinematicsError, match="out of reach at t = "):
         _check_reach(far)
     # Planning itself has to tell.
     _check_reach(far.changed(relaxations=[sm.Relaxation("y", 3.0)]))
     _check_reach(seam(is_carried=True, length=3.0))
+    # As of what other frames follow.
+    items = near.follows.items[0], far.follows.items[0]
+    _check_reach(
+        SimpleNamespace(
+            robot=near.robot,
+            task=near.task,
+            path=near.path,
+            relaxations=(),
+            follows=SimpleNamespace(items=items),
+        )
+    )
