@@ -8,6 +8,7 @@ import pytest
 from selfmotion.basics import Array
 from selfmotion.planning.result import Plan
 from selfmotion.work.placement import Tried, search
+from selfmotion.work.placement.place import _Here
 from selfmotion.work.placement.places import Places
 from selfmotion.work.placement.search import Box, Descent
 
@@ -146,3 +147,16 @@ def test_a_box_holds_its_ends_and_nothing_beyond() -> None:
         assert BOX.holds(BOX.at(np.array(share)))
     for share in ((-0.01, 0.5), (0.5, 1.01)):
         assert not BOX.holds(BOX.at(np.array(share)))
+
+
+def test_each_place_is_noted_and_told_as_it_is_planned() -> None:
+    told: list[int] = []
+    here = _Here(Formula(quadratic), BOX, lambda stage, done, total: told.append(done))
+    first = here.every(search.beginnings(BOX, 0, 4))
+    assert here.tried == first
+    more = here.near([(BOX.at(np.array([0.5, share])), first[0]) for share in (0.1, 0.9)])
+    assert here.tried == [*first, *more]
+    assert told == [1, 2, 3, 4, 5, 6]
+    ((arrived, tried),) = here.descents(first[:1])
+    assert arrived.cost <= first[0].cost
+    assert len(here.tried) == told[-1] == 6 + len(tried)
