@@ -91,6 +91,25 @@ def test_a_bound_that_holds_takes_nothing_from_a_step() -> None:
     np.testing.assert_allclose(planned(found)[3], [1.0, search._LONGEST], atol=ROUNDING)
 
 
+def test_how_costs_bend_across_a_bound_that_holds_is_of_no_account() -> None:
+    """Along it costs are the same, and so are all steps, whichever way they bend across."""
+
+    def along(twist: float) -> Array:
+        def cost(place: Array) -> float:
+            x, y = BOX.share(place)
+            return float(1.0 + x * (5.0 + twist * (y - 0.2)) + 20.0 * (y - 0.7) ** 4)
+
+        found, begun = descent(cost, (0.0, 0.2))
+        arrived = found.run(begun)
+        assert abs(BOX.share(arrived.place)[1] - 0.7) < abs(BOX.share(begun.place)[1] - 0.7)
+        return planned(found)
+
+    # The first step takes slopes, all others the changes of them.
+    one, other = along(4.0), along(-4.0)
+    assert len(one) > 10
+    np.testing.assert_allclose(one, other, atol=1e2 * ROUNDING)
+
+
 def test_no_step_is_longer_than_the_longest() -> None:
     found, begun = descent(lambda place: float(BOX.share(place) @ [-3.0, -4.0]), (0.0, 0.0))
     assert found.run(begun).cost < begun.cost
