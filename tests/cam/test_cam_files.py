@@ -830,3 +830,14 @@ def test_a_feed_without_a_unit_is_noted(feed: str, is_noted: bool, tmp_path: Pat
     text = f"UNITS/MM\nRAPID\nGOTO/0,0,5\nFEDRAT/{feed}\nGOTO/0,0,0\nGOTO/40,0,0\n"
     rows = read_cldata(written(tmp_path, "part.cls", text))["cut 1"]
     assert any("FEDRAT says neither MMPM nor IPM" in note for note in rows.notes) is is_noted
+
+
+def test_another_tool_is_told_by_the_beginnings_of_their_names(tmp_path: Path) -> None:
+    first, second = "1,BALL" + 60 * "A", "2,FLAT" + 60 * "B"
+    text = CLDATA.replace("LOADTL/1 $$ a ball", f"LOADTL/{first}").replace(
+        "GODLTA/10", f"LOADTL/{second}\nGODLTA/10"
+    )
+    rows = read_cldata(written(tmp_path, "tools.apt", text)).values()
+    notes = {note for one in rows for note in one.notes}
+    said = f"LOADTL/{second[:40]}: another tool than {first[:40]}: the tip of the arm's tool"
+    assert any(said in note for note in notes), notes

@@ -21,3 +21,11 @@ def test_a_turn_on_the_spot_is_about_the_tools_axis_and_the_shorter_way(angle: f
     # A step of more than a quarter turn is divided, and no other.
     assert len(steps) == (1 if abs(angle) <= 0.5 * np.pi else 2)
     assert max(np.linalg.norm(step) for step in steps) <= 0.5 * np.pi
+
+
+def test_a_quarter_turn_is_one_step_either_way() -> None:
+    """The most for which the shortest turn is known well: square corners have no pose more."""
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for last in (quarter, quarter.T):
+        assert len(turning(np.eye(3), last)) == 2
+    assert len(turning(quarter, quarter.T)) == 3

@@ -9,6 +9,7 @@ from selfmotion.model.follow import null_basis
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, Step, batch, minimise
 from selfmotion.planning.nodes.motion import stepped
+from selfmotion.planning.nodes.settings import SETTINGS
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
 
@@ -143,12 +144,8 @@ def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
     )
 
 
-def test_no_coordinate_changes_more_in_one_step_than_allowed(
-    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    far = sm.costs.Posture(100.0, posture=PANDA_HOME + 1.5)
-    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 4.0)
-    problem = problem_of((panda, "position", PANDA_HOME, path), costs=[far])
+def changes_of(problem: sm.Problem, monkeypatch: pytest.MonkeyPatch, rounds: int) -> list[float]:
+    """Return the largest change of a coordinate by each step that is tried."""
     begin = Batch.near(grid_of(problem), motions_of(problem))
     changes: list[float] = []
 
@@ -157,6 +154,27 @@ def test_no_coordinate_changes_more_in_one_step_than_allowed(
         return stepped(motion, step)
 
     monkeypatch.setattr(batch, "stepped", seen)
-    advanced(begin, 2)
+    advanced(begin, rounds)
+    return changes
+
+
+def test_no_coordinate_changes_more_in_one_step_than_allowed(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = sm.costs.Posture(100.0, posture=PANDA_HOME + 1.5)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 4.0)
+    problem = problem_of((panda, "position", PANDA_HOME, path), costs=[far])
     # Whole steps would be longer.
-    assert max(changes) == pytest.approx(batch._MAX_CHANGE)
+    assert max(changes_of(problem, monkeypatch, 2)) == pytest.approx(SETTINGS.max_change)
+
+
+def test_where_costs_curve_down_steps_are_long_all_the_same(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No more is added to a matrix that is not positive definite than it needs."""
+    hill = sm.costs.FunctionCost(lambda qd, q, t: -0.5 * np.sum(q**2, axis=1))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 4.0)
+    costs = [sm.costs.JointVelocity(), hill]
+    problem = problem_of((panda, "position", PANDA_HOME, path), costs=costs)
+    changes = changes_of(problem, monkeypatch, 2)
+    assert max(changes) == pytest.approx(SETTINGS.max_change)

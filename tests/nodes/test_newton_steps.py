@@ -12,10 +12,12 @@ from selfmotion.planning.nodes.motion import moved_along
 from selfmotion.planning.nodes.newton import (
     _merit,
     _raise_merit_penalty,
+    _relative_change,
     _residuals,
     _shorter,
     _Solver,
 )
+from selfmotion.planning.nodes.newton_kernels import merit_of_rows
 from selfmotion.planning.nodes.newton_system import Change, Model, System
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Status
@@ -229,6 +231,19 @@ def test_products_are_as_far_from_the_barrier_as_the_farthest(panda: sm.RobotMod
             setattr(solver, name, near)
 
 
+def test_the_merit_of_rows_is_that_of_its_formula() -> None:
+    """Gaps count on either side, and without rows there is nothing to count."""
+    h = np.random.default_rng(7).uniform(-1.0, 1.0, size=9)
+    s, e = np.random.default_rng(8).uniform(0.2, 0.8, size=(2, len(h)))
+    rho, mu, penalty = 3.0, 0.7, 0.4
+    gaps = h + s - e
+    assert gaps.min() < 0.0 < gaps.max()
+    expected = np.sum(rho * e - mu * (np.log(s) + np.log(e)) + penalty * np.abs(gaps))
+    assert merit_of_rows(h, s, e, rho, mu, penalty) == pytest.approx(expected, rel=SOLVED)
+    none = np.zeros(0)
+    assert merit_of_rows(none, none, none, rho, mu, penalty) == 0.0
+
+
 def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.RobotModel) -> None:
     """Slacks close all residuals; where rows hold, elastic variables are on the central path."""
     begin = bound(panda)
@@ -241,6 +256,11 @@ def test_a_warm_start_meets_its_rows_and_costs_no_more_violation(panda: sm.Robot
     room = solver._elastics * (solver._rho - solver._multipliers)
     holds = -h >= first / solver._multipliers
     np.testing.assert_allclose(room[holds], first, rtol=SOLVED)
+    # Where nothing is known of a row that holds, so are its slack and its multiplier.
+    unknown = known[solver._active] == 0.0
+    products = (solver._slacks * solver._multipliers)[unknown]
+    assert unknown.any()
+    np.testing.assert_allclose(products, first, rtol=DIFFERENCE)
     # Of others the violation comes on top.
     beyond = h + first / solver._multipliers
     expected = beyond + first / (solver._rho - solver._multipliers)
@@ -272,6 +292,23 @@ def test_the_unit_of_costs_changes_no_bit_of_a_step(panda: sm.RobotModel, unit: 
         np.testing.assert_array_equal(mine, others)
 
 
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**20])
+def test_penalties_are_in_the_unit_of_costs_and_changes_of_multipliers_in_none(
+    panda: sm.RobotModel, unit: float
+) -> None:
+    """Bit for bit where it is a power of two: of rows, and where ends have to meet."""
+    found = []
+    for each in (1.0, unit):
+        conditions = sm.constraints.JointVelocityLimits(1.0), sm.constraints.ClosedPath()
+        asked = problem(panda, *conditions, costs=[sm.costs.JointVelocity(each)])
+        solver = _Solver(nodes_of(asked, 8), None, SETTINGS.mu_first, roughly=False)
+        model, step = stepped(solver)
+        change = _relative_change(solver, step.multipliers)
+        _raise_merit_penalty(solver, model, step)
+        found.append((solver._merit_penalty / each, change))
+    assert found[0] == found[1]
+
+
 def test_no_coordinate_changes_more_in_one_step_than_allowed(
     panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -289,6 +326,22 @@ def test_no_coordinate_changes_more_in_one_step_than_allowed(
     assert found.status is Status.CONVERGED
     # Whole steps would be longer.
     assert max(changes) == pytest.approx(SETTINGS.max_change)
+
+
+def test_a_step_that_is_not_trusted_is_of_a_matrix_that_is_nearly_singular(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More is added to its diagonal until it is trusted; δ is for those not positive definite."""
+    solver = _Solver(nodes_of(problem(panda), 8), None, SETTINGS.mu_first, roughly=False)
+
+    def farthest() -> float:
+        _, step = stepped(solver)
+        return float(np.abs(step.nodes.reshape(len(step.nodes), 3, -1)[:, 0]).max())
+
+    trusted = 0.5 * farthest()
+    monkeypatch.setattr(newton_system, "SETTINGS", replace(SETTINGS, max_trusted=trusted))
+    assert 0.0 < farthest() <= trusted
+    assert solver._shift == 0.0
 
 
 def test_quadratic_convergence_spares_the_last_system(panda: sm.RobotModel) -> None:
@@ -326,6 +379,42 @@ def test_where_no_step_is_accepted_conditions_may_be_the_reason(
     )
     found = minimise(nodes_of(problem(panda, constraint, costs=[Uphill()]), 16), never)
     assert found.status is Status.INFEASIBLE
+
+
+@pytest.mark.parametrize(
+    ("rise", "predicted", "status"),
+    [
+        (0.0, 0.0, None),
+        (5e-14, 0.0, None),
+        (0.25e-3, 1e-3, Status.PRECISION),
+        (0.75e-3, 1e-3, Status.GRADIENT),
+    ],
+)
+def test_where_little_is_left_a_rise_is_rounding_or_a_wrong_gradient(
+    panda: sm.RobotModel,
+    monkeypatch: pytest.MonkeyPatch,
+    rise: float,
+    predicted: float,
+    status: Status | None,
+) -> None:
+    """A step is taken up to rounding; a rise of half of the predicted fall or more tells a fault.
+
+    Of a merit function that rises along the step, and is predicted to fall, by shares of the cost.
+    """
+    solver = _Solver(nodes_of(problem(panda), 8), None, SETTINGS.mu_first, roughly=False)
+    model, step = stepped(solver)
+    solver._predicted = 0.5 * SETTINGS.rounding * solver._cost_scale
+    cost, lengths = solver.motion.objective, [0.0]
+
+    def along(motion: NodeMotion, nodes: np.ndarray, by: np.ndarray) -> NodeMotion:
+        lengths.append(float(np.linalg.norm(nodes) / np.linalg.norm(step.nodes)))
+        return motion
+
+    monkeypatch.setattr(newton, "moved_along", along)
+    monkeypatch.setattr(newton, "_merit", lambda *_: cost * (1.0 + rise * lengths[-1]))
+    monkeypatch.setattr(newton, "_raise_merit_penalty", lambda *_: -predicted * cost)
+    assert solver._line_search(model, step) is status
+    assert (len(lengths) == 2) is (status is None)
 
 
 def test_a_rejected_step_is_cut_to_the_least_of_its_parabola() -> None:
@@ -379,6 +468,8 @@ def test_from_a_neighbouring_optimum_the_finest_is_found(panda: sm.RobotModel) -
     assert rough.multipliers.max() > SETTINGS.multiplier_floor * rough.motion.cost
     assert rough.is_rough
     assert not fine.is_rough
+    # Its last μ, of all rows together, is small to what the motion costs.
+    assert np.abs(rough.multipliers * rough.motion.h).sum() <= SETTINGS.mu_warm * rough.motion.cost
     assert not minimise(begin, never).is_rough
 
 

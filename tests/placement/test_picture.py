@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.work.placement import page, picture
-from selfmotion.work.placement.picture import _share, picture_of
+from selfmotion.work.placement.picture import _share, legend_of, picture_of
 
 # Columns and rows are of different sizes [m].
 ACROSS, UP = np.linspace(-0.2, 0.3, 6), np.linspace(0.1, 0.5, 9)
@@ -198,3 +198,23 @@ def test_the_most_frequent_reasons_are_told_first() -> None:
     assert [int(kind) for kind, _ in told] == list(range(kinds - 1, 0, -1))
     # Of the first all but one are counted.
     assert told[0][1] == str(kinds - 1)
+
+
+@pytest.mark.parametrize(
+    ("costs", "reasons", "said"),
+    [
+        ((1.0, 2.0), ("", ""), ["cost 1 to 2", "as much dearer"]),
+        ((1.0, np.nan), ("", "no plan"), ["cost 1 to 1", "in reach, but no plan"]),
+        ((np.nan, np.nan), ("out of reach", "no plan"), ["in reach, but no plan", "out of reach"]),
+    ],
+)
+def test_the_legend_says_what_there_is(
+    costs: tuple[float, ...], reasons: tuple[str, ...], said: list[str]
+) -> None:
+    """Of one cost there are no lines of others; the part only where it has an outline."""
+    for outline, more in ((np.empty((0, 2)), []), (np.ones((3, 2)), ["the part, to scale"])):
+        places = sm.placement.PlaceMap(
+            ("x", "y"), ACROSS[:2], UP[:1], np.array([costs]), (reasons,), np.empty((0, 2)), outline
+        )
+        legend = legend_of(places)
+        assert re.findall(r"</i>(.*?)</span>", legend) == [*said, *more]

@@ -9,7 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.result import Plan
-from selfmotion.work.placement import Placement, Tried
+from selfmotion.work.placement import Placement, Tried, results
 from selfmotion.work.placement.places import Places
 from selfmotion.work.placement.search import Box
 
@@ -49,6 +49,16 @@ def test_a_map_varies_two_coordinates_and_leaves_the_others_at_best(
             assert drawn.costs[i, j] == pytest.approx(1.0 + np.sum((place - BEST) ** 2))
     # Where the base moves no part has an outline.
     assert drawn.outline.shape == (0, 2)
+
+
+def test_the_outline_of_a_part_is_about_its_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From above; wherever the part is drawn in the problem, and as large."""
+    drawn = np.array([[3.0, 5.0], [3.4, 5.0], [3.4, 5.2]])
+    monkeypatch.setattr(results, "footprint", lambda problems, bodies: drawn)
+    outline = replace(placement(), of="part").map(points=2).outline
+    half = np.array([0.2, 0.1])
+    np.testing.assert_allclose(outline.min(axis=0), BEST[:2] - half)
+    np.testing.assert_allclose(outline.max(axis=0), BEST[:2] + half)
 
 
 @pytest.mark.parametrize("names", [("x",), ("x", "x"), ("x", "z"), NAMES])

@@ -8,6 +8,7 @@ import pytest
 from selfmotion.basics import Array
 from selfmotion.planning.result import Plan
 from selfmotion.work.placement import Tried, search
+from selfmotion.work.placement.place import _Here
 from selfmotion.work.placement.places import Places
 from selfmotion.work.placement.search import Box, Descent
 
@@ -90,6 +91,25 @@ def test_a_bound_that_holds_takes_nothing_from_a_step() -> None:
     np.testing.assert_allclose(planned(found)[3], [1.0, search._LONGEST], atol=ROUNDING)
 
 
+def test_how_costs_bend_across_a_bound_that_holds_is_of_no_account() -> None:
+    """Along it costs are the same, and so are all steps, whichever way they bend across."""
+
+    def along(twist: float) -> Array:
+        def cost(place: Array) -> float:
+            x, y = BOX.share(place)
+            return float(1.0 + x * (5.0 + twist * (y - 0.2)) + 20.0 * (y - 0.7) ** 4)
+
+        found, begun = descent(cost, (0.0, 0.2))
+        arrived = found.run(begun)
+        assert abs(BOX.share(arrived.place)[1] - 0.7) < abs(BOX.share(begun.place)[1] - 0.7)
+        return planned(found)
+
+    # The first step takes slopes, all others the changes of them.
+    one, other = along(4.0), along(-4.0)
+    assert len(one) > 10
+    np.testing.assert_allclose(one, other, atol=1e2 * ROUNDING)
+
+
 def test_no_step_is_longer_than_the_longest() -> None:
     found, begun = descent(lambda place: float(BOX.share(place) @ [-3.0, -4.0]), (0.0, 0.0))
     assert found.run(begun).cost < begun.cost
@@ -146,3 +166,16 @@ def test_a_box_holds_its_ends_and_nothing_beyond() -> None:
         assert BOX.holds(BOX.at(np.array(share)))
     for share in ((-0.01, 0.5), (0.5, 1.01)):
         assert not BOX.holds(BOX.at(np.array(share)))
+
+
+def test_each_place_is_noted_and_told_as_it_is_planned() -> None:
+    told: list[int] = []
+    here = _Here(Formula(quadratic), BOX, lambda stage, done, total: told.append(done))
+    first = here.every(search.beginnings(BOX, 0, 4))
+    assert here.tried == first
+    more = here.near([(BOX.at(np.array([0.5, share])), first[0]) for share in (0.1, 0.9)])
+    assert here.tried == [*first, *more]
+    assert told == [1, 2, 3, 4, 5, 6]
+    ((arrived, tried),) = here.descents(first[:1])
+    assert arrived.cost <= first[0].cost
+    assert len(here.tried) == told[-1] == 6 + len(tried)

@@ -79,7 +79,8 @@ def test_the_plan_is_of_the_problem_that_was_asked(
 
 
 def test_a_margin_that_is_there_costs_nothing(problem: sm.Problem) -> None:
-    small = sm.plan_with_margin(problem, sm.Margin(1e-4))
+    """Of all that may be displaced together, too."""
+    small = sm.plan_with_margin(problem, sm.Margin(1e-4), of=("part", "tool", "base"))
     assert small.reached
     assert not small.kept_apart
     assert small.extra_cost == 0.0

@@ -68,6 +68,16 @@ def test_slides_are_bounded_by_where_they_are(tmp_path: Path) -> None:
     assert [chain.is_revolute(joint) for joint in range(4)] == [False, False, False, True]
 
 
+def test_an_arm_may_have_one_joint(tmp_path: Path) -> None:
+    robot = gantry(tmp_path, kinds=("prismatic", "fixed", "fixed", "fixed"))
+    q = random_joints(robot)
+    assert len(q) == 1
+    chain, tip = ChainSeries(robot, q, HALF), robot.chain.tip
+    same(chain.place(tip), q[0])
+    same(chain.orientation(tip), series.exponential(np.zeros_like(q[0])))
+    same(chain.spin(tip), np.zeros_like(q[0][1:]))
+
+
 @pytest.mark.parametrize(("tool", "base"), [("l3", "l0"), ("l2", "l1"), ("l0", "l3")])
 def test_between_two_frames_only_the_joints_between_count(
     tool: str, base: str, tmp_path: Path

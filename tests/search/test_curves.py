@@ -1,5 +1,7 @@
 """Self-motion curves, against closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,7 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search import SelfMotion
-from selfmotion.planning.search.curves import curves_along
+from selfmotion.planning.search.curves import CurveSet, curves_along
 from support.followed import standing
 
 
@@ -119,3 +121,16 @@ def test_progress_goes_from_the_first_waypoint_to_the_last(arm: sm.RobotModel) -
     )
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert len(found) == 4
+
+
+def test_seeds_are_tried_at_every_so_manyth_waypoint_and_at_the_last() -> None:
+    tried: list[int] = []
+
+    def complete(curves: CurveSet, x: Array, seeds: Array, *, far: bool = False) -> None:
+        if far:
+            tried.append(int(x[0]))
+
+    motion = SimpleNamespace(revolute=np.ones(3, dtype=bool), spacing=0.1, complete=complete)
+    found = curves_along(motion, np.arange(11.0)[:, None], np.zeros((2, 3)), 4)
+    assert len(found) == 11
+    assert tried == [0, 4, 8, 10]

@@ -8,7 +8,7 @@ from selfmotion.basics import Array, NoSequenceError, silent
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search import Manifold
 from selfmotion.planning.search.manifold import OnPath
-from selfmotion.planning.search.sampled import _STARTS, _starts, sampled_layers
+from selfmotion.planning.search.sampled import _STARTS, _TRIES, _starts, sampled_layers
 from selfmotion.planning.search.search_bounds import SearchBounds
 from selfmotion.planning.search.sequences import best_sequences
 from support.arms import robot_named
@@ -16,6 +16,8 @@ from support.followed import standing
 from support.paths import line_of
 
 STEP = 0.5
+# Of sums of joint angles [rad].
+ROUNDING = 1e-12
 
 
 def searched(
@@ -79,6 +81,36 @@ def test_a_quarter_of_what_is_drawn_anywhere_comes_onto_the_path(name: str, task
     assert len(found) == _STARTS
     for q in found:
         assert max(sm.Task.of(task).miss(path.pose(1.0), robot.pose(q))) < 1e-9
+
+
+def test_samples_stray_from_what_is_reached_to_all_sides_and_by_weights(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A joint that counts much strays little."""
+    robot = robot_named("panda")
+    path, limits = line_of(robot, "position"), (robot.lower, robot.upper)
+    t = np.array([0.0, 0.1])
+    waypoints = OnPath(Follows.of(robot, path, "position"), t, *limits)
+    project, guesses = OnPath.project, list[Array]()
+
+    def seen(self: OnPath, q: Array, i: int, **given: bool) -> tuple[Array, Array]:
+        guesses.append(q)
+        return project(self, q, i, **given)
+
+    monkeypatch.setattr(OnPath, "project", seen)
+    weights = np.where(np.arange(robot.dof) == 2, 1e9, 1.0)
+    steps = np.full((1, robot.dof), STEP)
+    sampled_layers(waypoints, t, steps, limits, (), weights, 0, silent)
+    count = len(guesses[-1]) // (1 + _TRIES)
+    parents, strays = guesses[-1][:count], guesses[-1][count:]
+    away = strays - np.repeat(parents, _TRIES, axis=0)
+    assert count > 10
+    assert np.abs(away[:, 2]).max() < 1e-6
+    others = np.delete(away, 2, axis=1)
+    # Of a hundred normal numbers the mean is within half of their standard deviation.
+    assert (np.abs(others.mean(axis=0)) < 0.5 * others.std(axis=0)).all()
+    assert others.std(axis=0).min() > 0.1
+    assert np.abs(others).max() <= 0.5 * STEP + ROUNDING
 
 
 def test_a_path_that_nothing_follows_says_when() -> None:

@@ -1,13 +1,20 @@
 """Samples along curves: as near to each other as asked, and none twice."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from selfmotion.basics import Array
 from selfmotion.planning.search.search_bounds import SearchBounds
-from selfmotion.planning.search.vertices import _MERGED, _gap_fillers, _spaced
+from selfmotion.planning.search.vertices import (
+    _MERGED,
+    _CurveSamples,
+    _gap_fillers,
+    _interval_brackets,
+    _spaced,
+)
 
 SPACING, LENGTH = 0.1, 2.0
 
@@ -43,6 +50,20 @@ def test_what_is_kept_is_apart_and_near_to_all_that_is_left_out(seed: int) -> No
     assert np.diff(kept).min() > SPACING
     before = kept[np.searchsorted(kept, arcs, side="right") - 1]
     assert (arcs - before).max() <= SPACING
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_intervals_end_between_neighbours_also_around_the_start_of_a_closed_curve(
+    closed: bool,
+) -> None:
+    arcs, is_in = np.array([1.9, 0.5, 1.5, 1.0]), np.array([True, False, True, False])
+    ones = np.zeros(len(arcs), dtype=np.intp)
+    curves = SimpleNamespace(curves=[SimpleNamespace(closed=closed, length=LENGTH)])
+    found = _interval_brackets(_CurveSamples(ones, arcs, ones - 1), is_in, curves)
+    # Of a closed one the first sample is also a whole length further on.
+    expected = [(1.5, 1.0), (1.9, 0.5 + LENGTH)][: 2 if closed else 1]
+    assert list(zip(*(column.tolist() for column in found[1:]), strict=True)) == expected
+    assert found[0].tolist() == [0] * len(expected)
 
 
 def test_all_turns_are_those_within_the_limits() -> None:

@@ -16,21 +16,16 @@ from selfmotion.planning.nodes.charts import Centred, Charts, Place
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion, slopes_of, stepped
 from selfmotion.planning.nodes.node_matrix import NodeMatrix
+from selfmotion.planning.nodes.settings import SETTINGS
 
 # A motion is finished when a step predicts less than this share of its cost.
 _ENOUGH = 1e-3
 # Shares of Newton's step that are tried in turn.
 _SHARES = (1.0, 0.25, 0.0625)
-# Share of the predicted decrease that a step has to reach (Armijo).
-_ARMIJO = 1e-4
-# Largest change of a node's coordinate in one step [rad or m].
-_MAX_CHANGE = 0.5
 # Added to the diagonal, as a share of its median entry.
 _FLAT = 1e-11
-# Inertia correction: its first value, as a share of the largest entry …
+# Inertia correction: its first value, as a share of the largest entry.
 _DELTA_FIRST = 1e-6
-# … and its factor from one attempt to the next.
-_KAPPA_PLUS = 8.0
 # Fields of `Place`.
 _PLACE = ("q", "qd", "qdd", "tangents", "table")
 _LEAVES = "a motion that cannot be evaluated is to leave the others valid"
@@ -175,7 +170,7 @@ class Batch:
         sound = self.going & np.isfinite(rights).all(axis=1)
         for k in np.flatnonzero(sound).tolist():
             solved = matrix.part_solved(
-                k, self.count, rights[k], (_FLAT, _DELTA_FIRST, _KAPPA_PLUS)
+                k, self.count, rights[k], (_FLAT, _DELTA_FIRST, SETTINGS.kappa_plus)
             )
             if solved is None:
                 sound[k] = False
@@ -192,7 +187,8 @@ class Batch:
         motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
         by_node = step.reshape(self.count, -1, 3, r)
         farthest = np.abs(by_node[:, :, 0]).max(axis=(1, 2))
-        most = np.where(going, _MAX_CHANGE / np.maximum(farthest, _MAX_CHANGE), 0.0)
+        allowed = SETTINGS.max_change
+        most = np.where(going, allowed / np.maximum(farthest, allowed), 0.0)
         left, length = going.copy(), most.copy()
         for share in (*_SHARES, 0.0):
             length[left] = share * most[left]
@@ -200,7 +196,7 @@ class Batch:
             if found is None:
                 raise RuntimeError(_LEAVES)
             new = Batch._of(found, going & (length > 0.0), promised)
-            left[left] = ~(new.costs <= self.costs - _ARMIJO * length * due)[left]
+            left[left] = ~(new.costs <= self.costs - SETTINGS.armijo * length * due)[left]
             if not left.any():
                 break
         return new
