@@ -12,6 +12,7 @@ from selfmotion.shell.view import EditSession
 from selfmotion.shell.view.motions import standing
 from selfmotion.shell.view.planning import Planning
 from selfmotion.shell.view.requests import NewerRequest, Outcome, Request
+from selfmotion.shop.controllers import check_arm
 from support.views import CIRCLE, Heard, moved, opened
 
 
@@ -260,12 +261,10 @@ def test_controllers_that_have_no_such_arm_are_not_offered(page):
     assert not {".script", ".src"} & offered
 
 
-def test_controllers_that_have_such_an_arm_are_offered(tmp_path):
-    file = tmp_path / "line.toml"
-    text = CIRCLE.replace("panda", "ur10").replace("[0.5, 0, 0.5]", "[0.7, 0.2, 0.4]")
-    file.write_text(text)
-    with opened(file) as session:
-        assert {".script", ".src", ".mod"} <= set(session.exports)
+def test_controllers_that_have_such_an_arm_are_offered():
+    ur10, settings = sm.load_robot("ur10"), sm.files.ProgramSettings()
+    for controller in ("urscript", "krl", "rapid"):
+        check_arm(ur10, controller, settings)
 
 
 def test_one_page_at_a_time(page):
