@@ -7,6 +7,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.path.pace import Pace
 from selfmotion.model.task import SE3
+from support.paths import polygon
 
 # Rounding of a sum of some thousand terms, relative to what is summed.
 ROUNDING = 1e-12
@@ -59,3 +60,22 @@ def test_a_straight_line_at_a_feed_has_few_breaks() -> None:
     end = SE3(np.eye(3), np.array([0.3, 0.1, 0.0]))
     path = sm.paths.Feed(sm.paths.Line(start, end, 1.0), 0.1)
     assert len(path.marks) < 30
+
+
+# What paths at a feed may be off for what is left out, of a metre, and of their speeds.
+OFF, OFF_SPEED = 1e-10, 1e-6
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_path_at_a_feed_is_that_of_all_nodes(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    points, turns = polygon(seed)
+    corners = sm.paths.Polyline(points, turns, **({"tolerance": 5e-3} if seed % 2 else {}))
+    few = sm.paths.Feed(corners, 0.05, acceleration=1.0, smoothing=0.05)
+    monkeypatch.setattr(Pace, "simplified", lambda self: self)
+    all_nodes = sm.paths.Feed(corners, 0.05, acceleration=1.0, smoothing=0.05)
+    assert len(few.marks) < 0.6 * len(all_nodes.marks)
+    t = np.linspace(0.0, few.duration, 501)
+    found, asked = few.samples(t), all_nodes.samples(t)
+    np.testing.assert_allclose(found.translation, asked.translation, rtol=0.0, atol=OFF)
+    scale = np.abs(asked.twist).max()
+    np.testing.assert_allclose(found.twist, asked.twist, rtol=0.0, atol=OFF_SPEED * scale)
