@@ -86,8 +86,10 @@ class FeedReached(Requirement):
         slowest, fastest = found.asked, 0.0
         for first, last, is_counted in _runs(intervals, counts):
             within = _Pace(found.path, low if is_counted else -high, high)
-            ends = intervals[first, 0], intervals[last, 1]
-            edges = np.union1d(ends, _marks(found, first, last))
+            start, end = intervals[first, 0], intervals[last, 1]
+            marks = np.asarray(found.path.marks)
+            inside = (marks > start) & (marks < end)
+            edges = np.concatenate([[start], marks[inside], [end]])
             known = bounded(within, motion.robot, motion.trajectory, edges)
             # A motion may be so near to its limit that halving does not decide.
             if _is_off(known):
@@ -157,13 +159,6 @@ def _runs(intervals: Array, counts: Flags) -> Iterator[tuple[int, int, bool]]:
     cuts = np.flatnonzero(offset | (counts[1:] != counts[:-1])) + 1
     for first, after in pairwise([0, *cuts.tolist(), len(intervals)]):
         yield first, after - 1, bool(counts[first])
-
-
-def _marks(found: FeedProfile, first: int, last: int) -> Array:
-    intervals, _ = found.pieces
-    marks = np.asarray(found.path.marks)
-    inside = (marks > intervals[first, 0]) & (marks < intervals[last, 1])
-    return np.asarray(marks[inside])
 
 
 def _is_off(speeds: Bounds) -> bool:

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -68,19 +67,24 @@ class Pace:
 
     def simplified(self) -> "Pace":
         """Return the same without the samples that lie on the polynomial between two others."""
-        kept = [0]
-        for first, last in pairwise(self._breaks):
-            kept += self._needed(first, last)
-        return self._some(kept)
+        kept = self._breaks
+        while True:
+            found = self._some(kept)
+            off = np.setdiff1d(np.flatnonzero(~self._lies_on(found)), kept)
+            if not len(off):
+                return found
+            # Where one polynomial is not enough, halves of it are tried.
+            intervals = np.unique(np.searchsorted(kept, off)) - 1
+            kept = np.union1d(kept, (kept[intervals] + kept[intervals + 1]) // 2)
 
     @property
-    def _breaks(self) -> list[int]:
+    def _breaks(self) -> Ints:
         """Samples at which the polynomial may become another one; both ends."""
         span = self.t[2:] - self.t[:-2]
         # Of two intervals the longer one's polynomial goes on into the other with less rounding.
         met = self._is_met(slice(None, -1), span, slice(2, None))
         met |= self._is_met(slice(1, None), self.t[:-2] - self.t[1:-1], slice(None, -2))
-        return [0, *(np.flatnonzero(~met) + 1).tolist(), len(self.t) - 1]
+        return np.concatenate([[0], np.flatnonzero(~met) + 1, [len(self.t) - 1]])
 
     def _is_met(self, pieces: slice, later: Array, samples: slice) -> Flags:
         """Return whether polynomials, so much later than they begin, meet samples, (K - 2,)."""
@@ -95,28 +99,19 @@ class Pace:
             coefficients = coefficients[:-1] * powers[:, None]
         return met
 
-    def _needed(self, first: int, last: int) -> list[int]:
-        """Return the samples after the first that this interval needs, up to the last."""
-        if last - first < 2 or self._is_one(first, last):
-            return [last]
-        middle = (first + last) // 2
-        return [*self._needed(first, middle), *self._needed(middle, last)]
-
-    def _is_one(self, first: int, last: int) -> bool:
-        """Return whether the samples between two lie on the polynomial between them."""
-        inner, between = slice(first + 1, last), self._some([first, last])
-        return all(
-            np.abs(between(self.t[inner], order) - known[inner]).max()
-            <= share * np.abs(known).max()
-            for order, (share, known) in enumerate(zip(_ON_IT, self._known, strict=False))
-        )
+    def _lies_on(self, other: "Pace") -> Flags:
+        """Return which samples lie on another pace, (K,)."""
+        met = np.ones(len(self.t), dtype=bool)
+        for order, (share, known) in enumerate(zip(_ON_IT, self._known, strict=False)):
+            met &= np.abs(other(self.t, order) - known) <= share * np.abs(known).max()
+        return met
 
     @property
     def _known(self) -> tuple[Array, ...]:
         """σ, its rate, and its second derivative where that is known, (K,) each."""
         return (self.sigma, self.rate, *(() if self.bend is None else (self.bend,)))
 
-    def _some(self, rows: list[int]) -> "Pace":
+    def _some(self, rows: Ints) -> "Pace":
         bend = None if self.bend is None else self.bend[rows]
         return Pace(self.t[rows], self.sigma[rows], self.rate[rows], bend)
 
