@@ -1,37 +1,7 @@
-"""What can go wrong: every error is a `selfmotion.SelfmotionError`, and says what to do."""
+"""What can go wrong: every error is a `selfmotion.SelfmotionError`, and says what to do.
 
-from selfmotion.basics import (
-    BreakdownError,
-    CollisionError,
-    DeadlineError,
-    FeedError,
-    FileFormatError,
-    FormerUseWarning,
-    InverseKinematicsError,
-    NoSequenceError,
-    PathError,
-    PlanError,
-    ProblemError,
-    RedundancyError,
-    RenderError,
-    RobotError,
-    StartError,
-)
+A door: what it names is made in `selfmotion.basics.errors`.
+"""
 
-__all__ = [
-    "BreakdownError",
-    "CollisionError",
-    "DeadlineError",
-    "FeedError",
-    "FileFormatError",
-    "FormerUseWarning",
-    "InverseKinematicsError",
-    "NoSequenceError",
-    "PathError",
-    "PlanError",
-    "ProblemError",
-    "RedundancyError",
-    "RenderError",
-    "RobotError",
-    "StartError",
-]
+from selfmotion.basics.errors import *  # noqa: F403
+from selfmotion.basics.errors import __all__ as __all__

@@ -1,21 +1,7 @@
-"""Bodies that stand around or ride along, and what measures their distances."""
+"""Bodies that stand around or ride along, and what measures their distances.
 
-from selfmotion.model.collision import (
-    Box,
-    Capsule,
-    CollisionModel,
-    Cylinder,
-    Mesh,
-    Obstacle,
-    Sphere,
-)
+A door: what it names is made in `selfmotion.model.collision`.
+"""
 
-__all__ = [
-    "Box",
-    "Capsule",
-    "CollisionModel",
-    "Cylinder",
-    "Mesh",
-    "Obstacle",
-    "Sphere",
-]
+from selfmotion.model.collision import *  # noqa: F403
+from selfmotion.model.collision import __all__ as __all__

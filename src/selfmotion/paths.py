@@ -1,47 +1,7 @@
-"""Tool motions over time: where the tool is to be, and how fast."""
+"""Tool motions over time: where the tool is to be, and how fast.
 
-from selfmotion.model.path import (
-    Circle,
-    Dwell,
-    Feed,
-    Joined,
-    Line,
-    Path,
-    PathSamples,
-    Placed,
-    Polyline,
-    Retimed,
-    Reversed,
-    Section,
-    Spiral,
-    Stroke,
-    TwistPath,
-    Waypoints,
-    Weave,
-    section_at_rest,
-    with_leads,
-    with_run_ups,
-)
+A door: what it names is made in `selfmotion.model.path`.
+"""
 
-__all__ = [
-    "Circle",
-    "Dwell",
-    "Feed",
-    "Joined",
-    "Line",
-    "Path",
-    "PathSamples",
-    "Placed",
-    "Polyline",
-    "Retimed",
-    "Reversed",
-    "Section",
-    "Spiral",
-    "Stroke",
-    "TwistPath",
-    "Waypoints",
-    "Weave",
-    "section_at_rest",
-    "with_leads",
-    "with_run_ups",
-]
+from selfmotion.model.path import *  # noqa: F403
+from selfmotion.model.path import __all__ as __all__

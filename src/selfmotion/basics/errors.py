@@ -4,6 +4,24 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+__all__ = [
+    "BreakdownError",
+    "CollisionError",
+    "DeadlineError",
+    "FeedError",
+    "FileFormatError",
+    "FormerUseWarning",
+    "InverseKinematicsError",
+    "NoSequenceError",
+    "PathError",
+    "PlanError",
+    "ProblemError",
+    "RedundancyError",
+    "RenderError",
+    "RobotError",
+    "StartError",
+]
+
 
 def nearest(name: str, names: Iterable[str], alike: float = 0.5) -> str:
     """Return "; nearest: 'a', 'b'" with the names that are like `name`, "" where none is."""

@@ -44,3 +44,13 @@ from selfmotion.model.collision.shapes import (
     Sphere as Sphere,
 )
 from selfmotion.model.collision.solids import Solid as Solid
+
+__all__ = [
+    "Box",
+    "Capsule",
+    "CollisionModel",
+    "Cylinder",
+    "Mesh",
+    "Obstacle",
+    "Sphere",
+]

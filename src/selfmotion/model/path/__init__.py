@@ -52,3 +52,26 @@ from selfmotion.model.path.written_poses import (
     from_normal as from_normal,
     pose_of as pose_of,
 )
+
+__all__ = [
+    "Circle",
+    "Dwell",
+    "Feed",
+    "Joined",
+    "Line",
+    "Path",
+    "PathSamples",
+    "Placed",
+    "Polyline",
+    "Retimed",
+    "Reversed",
+    "Section",
+    "Spiral",
+    "Stroke",
+    "TwistPath",
+    "Waypoints",
+    "Weave",
+    "section_at_rest",
+    "with_leads",
+    "with_run_ups",
+]

@@ -39,3 +39,15 @@ from selfmotion.shell.replay.sequence import (
     unproved as unproved,
 )
 from selfmotion.shell.replay.still import figure as figure, picture as picture
+
+__all__ = [
+    "check_pictures",
+    "figure",
+    "meshcat_html",
+    "notebook_html",
+    "render_gif",
+    "render_png",
+    "replay_html",
+    "write_meshcat",
+    "write_replay",
+]
