@@ -25,14 +25,14 @@ _SAMPLES = 1000
 
 def redundancy(robot: RobotModel, task: Task) -> int:
     """Return n - rank J of a task at generic configurations."""
-    jacobians = [robot.task_jacobian(q, task) for q in robot.generic_configurations()]
+    jacobians = robot.task_jacobian(robot.generic_configurations(), task)
     return robot.dof - int(max(np.linalg.matrix_rank(jacobians, tol=_ZERO)))
 
 
 def can_follow(robot: RobotModel, task: Task) -> bool:
     """Return whether the tool can move in all rows of a task; see `RobotModel.can_follow`."""
     if task is Task.PLANAR_POSE:
-        jacobians = np.array([robot.jacobian(q) for q in robot.generic_configurations()])
+        jacobians = robot.jacobian(robot.generic_configurations())
         if np.abs(jacobians[:, 2:5]).max() > _ZERO:
             return False
     return robot.dof - redundancy(robot, task) == task.dimension
@@ -43,7 +43,7 @@ def most_dexterous(robot: RobotModel, task: Task) -> Array:
     lower, upper = robot.finite_limits()
     share = np.random.default_rng(0).uniform(0.25, 0.75, (_SAMPLES, robot.dof))
     samples = lower + (upper - lower) * share
-    jacobians = np.array([robot.task_jacobian(q, task) for q in samples])
+    jacobians = robot.task_jacobian(samples, task)
     determinants = np.linalg.det(jacobians @ jacobians.transpose(0, 2, 1))
     return np.array(samples[np.argmax(determinants)])
 

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.model.robot import null_space
 from selfmotion.paper.baselines.base import Motion, PoseFeedback, along_rate
-from selfmotion.paper.baselines.local import MANIPULABILITY, configuration_gradient
+from selfmotion.paper.baselines.local import MANIPULABILITY, configuration_gradients
 from selfmotion.problem.costs import Cost
 from selfmotion.problem.problem import Problem
 
@@ -47,24 +47,29 @@ class ExtendedJacobian:
         attraction = self.attraction
         if attraction is None:
             attraction = _ATTRACTION / problem.path.duration
+        robot, task = problem.robot, problem.task
         counted = 0
+        displacements = _DIFFERENCE * np.eye(robot.dof)
 
         def projected(t: float, q: Array) -> Array:
+            """Return g at configurations (K, n), (K, n)."""
             nonlocal counted
-            counted += 1
-            here = feedback(t, q)
-            slope = configuration_gradient(problem, self.criterion, t, q)
-            y = np.linalg.solve(here.gram, here.jacobian @ slope)
-            return np.asarray(slope - here.jacobian.T @ y)
+            counted += len(q)
+            jacobians = robot.task_jacobian(q, task)
+            transposed = jacobians.transpose(0, 2, 1)
+            slopes = configuration_gradients(problem, self.criterion, t, q)[..., None]
+            y = np.linalg.solve(jacobians @ transposed, jacobians @ slopes)
+            return np.asarray((slopes - transposed @ y)[..., 0])
 
         def rate(t: float, q: Array) -> Array:
             here = feedback(t, q)
             null = null_space(here.jacobian).T
-            shifts = _DIFFERENCE * np.eye(len(q))
-            change = np.array([projected(t, q + s) - projected(t, q - s) for s in shifts]).T
-            square = np.vstack([here.jacobian, null @ change / (2.0 * _DIFFERENCE)])
-            wanted = np.append(here.command, -attraction * (null @ projected(t, q)))
             try:
+                beside = projected(t, np.vstack([q, q + displacements, q - displacements]))
+                after, before = np.split(beside[1:], 2)
+                change = (after - before).T / (2.0 * _DIFFERENCE)
+                square = np.vstack([here.jacobian, null @ change])
+                wanted = np.append(here.command, -attraction * (null @ beside[0]))
                 return np.asarray(np.linalg.solve(square, wanted))
             except np.linalg.LinAlgError:
                 raise BreakdownError(

@@ -197,9 +197,13 @@ class _Trials:
 
 def configuration_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Array:
     """Return ∂h/∂q (n,) of a cost of the configuration, at one configuration."""
-    instant = Sampling.trapezoidal(np.array([t]))
-    samples = Samples.along(problem.follows, instant, q[None], np.zeros((1, len(q))))
-    partials = criterion.gradient(samples)
+    return np.asarray(configuration_gradients(problem, criterion, t, q[None])[0])
+
+
+def configuration_gradients(problem: Problem, criterion: Cost, t: float, q: Array) -> Array:
+    """Return the same at several configurations (K, n) at one time, (K, n)."""
+    instant = Sampling.trapezoidal(np.full(len(q), t))
+    partials = criterion.gradient(Samples.along(problem.follows, instant, q, np.zeros_like(q)))
     if partials.q is None:
         raise ProblemError(f"cost '{criterion.name}' does not depend on the configuration")
-    return np.asarray(partials.q[0])
+    return np.asarray(partials.q)
