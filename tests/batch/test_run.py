@@ -109,6 +109,7 @@ def test_values_that_are_set_are_of_all_combinations(grid: Path, tmp_path: Path)
         grid_items(tmp_path / "no_grid.toml", {"rest": False})
 
 
+@pytest.mark.site
 def test_two_processes_and_threads_give_the_same(
     reference: sm.Batch, grid: Path, tmp_path: Path
 ) -> None:
@@ -176,6 +177,7 @@ def test_a_run_that_was_killed_goes_on(reference: sm.Batch, grid: Path, tmp_path
     same(result, reference)
 
 
+@pytest.mark.site
 def test_a_worker_that_is_killed_loses_nothing(
     reference: sm.Batch, grid: Path, tmp_path: Path
 ) -> None:

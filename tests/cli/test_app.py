@@ -188,6 +188,7 @@ def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
     assert "where damping was active" in text
 
 
+@pytest.mark.site
 def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
     planned = run(
         *("plan", "planar_3r", *on_circle("0.1", "z"), "--task", "planar"),

@@ -66,6 +66,7 @@ def test_plans_keep_what_plans_by_the_urdf_alone_exceed(seed: int) -> None:
     assert any(isinstance(item, Limits) for item in problem.constraints)
 
 
+@pytest.mark.site
 def test_the_fastest_motion_keeps_off_where_no_joint_may_move() -> None:
     """Its joint path is planned without limits of the pace, but not to where there is no pace."""
     found = sm.fastest(franka.fast_line(robot_named("fr3"), 1)).plan

@@ -621,6 +621,7 @@ def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_
     assert far.position <= program_deviation(plan, file)[1].path.position + ROUNDED
 
 
+@pytest.mark.site
 def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     abb: sm.RobotModel, tmp_path: Path
 ) -> None:

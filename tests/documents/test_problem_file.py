@@ -344,6 +344,7 @@ def test_examples_run_as_they_are(name: str, tmp_path: Path) -> None:
         example_text("none", "cell.toml")
 
 
+@pytest.mark.site
 def test_examples_of_files_jobs_and_cells_are_read(tmp_path: Path) -> None:
     urdf = (ROOT / "robots" / "planar_3r.urdf").read_text()
     (tmp_path / "arms").mkdir()

@@ -203,6 +203,7 @@ def test_windows_of_relaxations_stay_where_they_are_on_the_path() -> None:
         )
 
 
+@pytest.mark.site
 def test_a_pace_that_no_smooth_one_is_near_ends_the_rounds() -> None:
     """The quintic through it would turn back: what was found by then is the motion."""
     panda = robot_named("panda")

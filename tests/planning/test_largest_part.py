@@ -276,6 +276,7 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
     assert not any(stage.startswith("search") for stage in stages)
 
 
+@pytest.mark.site
 def test_how_far_it_goes_does_not_depend_on_where_the_cell_is(panda: sm.RobotModel) -> None:
     """The same problem with the base turned by next to nothing: limits of all rates bind."""
     home = panda.pose(PANDA_HOME)

@@ -111,6 +111,7 @@ def test_the_same_inputs_give_the_same_segments(
     assert np.array_equal(*runs)
 
 
+@pytest.mark.site
 def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.RobotModel) -> None:
     # The paper's cost (eq. 12), on a path where the self-motion saves more than 5 %.
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 20.0, normal=(1.0, 0.0, 0.0))

@@ -134,6 +134,7 @@ def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotMod
             sm.retime(plan, bad)
 
 
+@pytest.mark.site
 def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
     slow = sm.plan(sm.Problem(panda, path, start=PANDA_HOME)).require()

@@ -160,6 +160,7 @@ def test_each_parameter_of_plan_matters() -> None:
         sm.plan(given, search=sm.Search(starts=3))
 
 
+@pytest.mark.site
 def test_each_parameter_of_move_matters() -> None:
     last = PANDA_HOME + 0.3
     heard, tell = told()
@@ -218,6 +219,7 @@ def test_each_parameter_of_other_paces_matters() -> None:
             call()
 
 
+@pytest.mark.site
 def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> None:
     # One round shows it as well as many.
     monkeypatch.setattr(sys.modules["selfmotion.planning.planner.fastest"], "ROUNDS", 1)
