@@ -8,6 +8,7 @@ import pytest
 from typer.main import get_command
 
 import selfmotion as sm
+from selfmotion.basics import write_document
 from selfmotion.shell.cli import app
 from support.shell import in_full, invoke
 
@@ -80,3 +81,45 @@ def test_what_is_not_verified_is_1_in_every_command(tmp_path: Path) -> None:
         code, text = invoke(*arguments, "--json")
         assert code == 1, (arguments, text)
         json.loads(text)
+
+
+# Commands of plans, and of problems and jobs, with what else they need.
+OF_PLANS = {name: BAD[name][1:] for name in ("compare", "replay", "retime", "margin", "sheet")}
+OF_PLANS |= {"export": ("--out", "a.csv"), "calibrate": ("no.yaml",)}
+OF_DOCUMENTS = {name: BAD[name][1:] for name in ("job", "batch", "plan-margin", "follow", "place")}
+
+
+@pytest.mark.parametrize("command", sorted(OF_PLANS))
+def test_a_problem_in_place_of_a_plan_is_told_how_to_become_one(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text('robot.name = "panda"\n')
+    code, _, errors = in_full(command, "a.toml", *OF_PLANS[command])
+    assert code == 2
+    said = "a.toml: is no plan written by selfmotion (.npz); `selfmotion plan` makes one"
+    assert said in " ".join(errors.split())
+
+
+@pytest.mark.parametrize("command", sorted(OF_DOCUMENTS))
+def test_what_is_planned_in_place_of_a_problem_is_refused_by_its_suffix(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.program").write_bytes(b"PK\x05\x06" + bytes(18))
+    code, _, errors = in_full(command, "a.program", *OF_DOCUMENTS[command])
+    assert code == 2
+    assert "a.program: has suffix '.program', expected .toml, .json or .yaml" in " ".join(
+        errors.split()
+    )
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".json", ".yaml", ".yml"])
+def test_a_problem_file_has_any_suffix_of_documents(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_document(Path(f"a{suffix}"), {"robot": {"name": "panda"}, "task": "pose"})
+    code, _, errors = in_full("plan", f"a{suffix}")
+    assert code == 2
+    assert f"error: a{suffix}: path: is missing" in errors

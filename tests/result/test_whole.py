@@ -10,6 +10,7 @@ import selfmotion as sm
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import CheckedMotion, MotionSpecification, continuity_faults
 from selfmotion.planning.result.equality import same_path
+from selfmotion.planning.result.plan import views
 from support.arms import robot_named
 
 # A bump of the path: far above what paths that are one may differ by [m].
@@ -251,3 +252,15 @@ def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan)
     assert not list(
         continuity_faults(robot, [whole, CheckedMotion("'feed'", pushed, (True, True))])
     )
+
+
+def test_a_package_without_what_draws_is_told_to_be_installed_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("selfmotion.planning.result.plan.entry_points", lambda **_: ())
+    views.cache_clear()
+    with pytest.raises(sm.errors.RenderError, match="install it again"):
+        views()
+    monkeypatch.undo()
+    views.cache_clear()
+    assert views()

@@ -45,6 +45,8 @@ from selfmotion.basics.errors import (
     nearest as nearest,
 )
 from selfmotion.basics.files import (
+    ARCHIVE_SUFFIXES as ARCHIVE_SUFFIXES,
+    DOCUMENT_SUFFIXES as DOCUMENT_SUFFIXES,
     as_path as as_path,
     digest_of as digest_of,
     digest_of_file as digest_of_file,

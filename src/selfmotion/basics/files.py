@@ -24,6 +24,10 @@ from selfmotion.basics.errors import FileFormatError
 _DESCRIPTION = "description"
 # Suffixes of files with several plans.
 _OF_MANY = (".program", ".parts")
+# Suffixes of what is saved whole.
+ARCHIVE_SUFFIXES = (".npz", *_OF_MANY)
+# Suffixes of problem and job files.
+DOCUMENT_SUFFIXES = (".toml", ".json", ".yaml", ".yml")
 # Largest file of arrays that is read [bytes]: 250,000 samples of a plan are a tenth.
 _LARGEST = 250_000_000
 # Characters of texts besides letters: blanks, ends of lines, pages, tapes and files.
@@ -142,7 +146,10 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
             f"[step.made for step in sm.load_program(file).steps if step.is_seam]"
         )
     if os.path.exists(file) and not zipfile.is_zipfile(file):
-        raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
+        is_document = file.suffix in DOCUMENT_SUFFIXES
+        hint = "; `selfmotion plan` makes one of a problem file, `selfmotion job` of a job file"
+        what = f"{file}: is no plan written by selfmotion (.npz)"
+        raise FileFormatError(f"{what}{hint if is_document else ''}")
     arrays = read_arrays(file)
     if _DESCRIPTION not in arrays:
         raise FileFormatError(f"{file}: is no plan written by selfmotion: it has no description")

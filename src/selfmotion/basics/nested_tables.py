@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics.errors import FileFormatError, nearest
-from selfmotion.basics.files import write_text
+from selfmotion.basics.files import DOCUMENT_SUFFIXES, write_text
 from selfmotion.basics.inputs import TURN, is_number
 
 # Keys of poses, tolerances and loads that may end in _deg or _mm.
@@ -41,6 +41,8 @@ def read_document(file: Path) -> dict[str, Any]:
 
 def read_values(file: Path) -> Any:
     """Read a table, or a list; see `read_document`."""
+    if file.suffix not in DOCUMENT_SUFFIXES:
+        raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml, .json or .yaml")
     try:
         found = _parse(file, file.read_text(encoding="utf-8-sig"))
     except OSError as error:
@@ -69,9 +71,7 @@ def _parse(file: Path, text: str) -> Any:
                 return json.loads(text, object_pairs_hook=_without_twins)
             except (ValueError, RecursionError) as error:
                 raise FileFormatError(f"{file}: is not JSON: {error}") from error
-        case ".yaml" | ".yml":
-            return _parse_yaml(file, text)
-    raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml, .json or .yaml")
+    return _parse_yaml(file, text)
 
 
 def _parse_yaml(file: Path, text: str) -> Any:

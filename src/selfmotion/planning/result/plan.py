@@ -20,6 +20,7 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
+    RenderError,
     RobotError,
     SelfmotionError,
     as_path,
@@ -84,8 +85,19 @@ class Views(Protocol):
 
 @cache
 def views() -> Views:
-    """Return what makes views of plans: the package's entry point of this name."""
-    (entry,) = entry_points(group="selfmotion_views", name="replay")
+    """Return what makes views of plans: the package's entry point of this name.
+
+    Raises
+    ------
+    RenderError
+        The package was installed before it had one, or is not installed.
+    """
+    entry = next(iter(entry_points(group="selfmotion_views", name="replay")), None)
+    if entry is None:
+        raise RenderError(
+            "what draws plans is found by the entry point 'replay' of the installed package, which "
+            "has none: install it again (`pip install .`, or `pip install -e .` in a checkout)"
+        )
     found: Views = entry.load()
     return found
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import selfmotion as sm
-from selfmotion.basics import read_document
+from selfmotion.basics import ARCHIVE_SUFFIXES, DOCUMENT_SUFFIXES, read_document
 from selfmotion.model.path import spread_along
 from selfmotion.shell.cli import options
 from selfmotion.shell.cli.app import StageDisplay, plan_with_progress, stages
@@ -24,8 +24,6 @@ from selfmotion.shell.documents import (
 )
 from selfmotion.shop.cam import PATH_SUFFIXES, events_of, has_normals
 
-# Of problem files.
-SUFFIXES = (".toml", ".json")
 # So many poses of a path are looked at for whether normals are meant the other way.
 _LOOKS = 7
 
@@ -128,7 +126,12 @@ def read(
             f"{given}: is a path, expected a robot or a problem file first: selfmotion plan panda "
             f"--path {given}"
         )
-    if Path(given).suffix in SUFFIXES:
+    if Path(given).suffix in ARCHIVE_SUFFIXES:
+        raise sm.errors.ProblemError(
+            f"{given}: holds motions that are planned, expected a robot or a problem file; "
+            f"planning begins at the motion of a plan (.npz) that is given as --from"
+        )
+    if Path(given).suffix in DOCUMENT_SUFFIXES:
         return of_file(Path(given), said, allow_code)
     document: dict[str, Any] = {"robot": {"name" if given in sm.NAMED_ARMS else "file": given}}
     document |= usual or {}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import selfmotion as sm
-from selfmotion.basics import Progress
+from selfmotion.basics import DOCUMENT_SUFFIXES, Progress
 from selfmotion.certificate import Extreme
 from selfmotion.shell.cli import checks, documents, jobs, options, parts
 from selfmotion.shop import controllers
@@ -132,7 +132,7 @@ class CheckRequest:
         bodies = (body for each in problem.clearances for body in each.obstacles)
         meshes = (body.note for body in bodies if isinstance(body, sm.obstacles.Mesh))
         notes = (*request.notes, *filter(None, meshes))
-        if Path(self.robot).suffix not in documents.SUFFIXES:
+        if Path(self.robot).suffix not in DOCUMENT_SUFFIXES:
             notes = (*notes, *problem.robot.urdf.notes, *problem.path.notes)
         return checks.Wanted(problem, request.tolerance, "", None, notes, self.said, task)
 

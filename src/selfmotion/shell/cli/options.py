@@ -21,13 +21,13 @@ ProblemArgument = Annotated[
     str,
     typer.Argument(
         help="A robot: name (see `selfmotion robots`), .urdf or .xacro file; to plan, also a "
-        "problem file (.toml, .json; see `selfmotion init`)."
+        "problem file (.toml, .json, .yaml; see `selfmotion init`)."
     ),
 ]
 DocumentArgument = Annotated[
     Path,
     typer.Argument(
-        help="A problem file or a job file (.toml, .json); to show, also a plan (.npz) or .program."
+        help="A problem file or a job file (.toml, .json, .yaml); `view` shows plans as well."
     ),
 ]
 DocumentsArgument = Annotated[
@@ -180,8 +180,8 @@ RobotOption = Annotated[
     str | None,
     typer.Option(
         help="What a motion is of: name (`selfmotion robots`), .urdf file, or a problem file "
-        "(.toml, .json) or the plan that it comes from (.npz), with everything these ask for; of "
-        "the .src, .mod or .script of a job its .program."
+        "(.toml, .json, .yaml) or the plan that it comes from (.npz), with everything these ask "
+        "for; of the .src, .mod or .script of a job its .program."
     ),
 ]
 CalibrationOption = Annotated[

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 import selfmotion as sm
-from selfmotion.basics import write_document
+from selfmotion.basics import DOCUMENT_SUFFIXES, write_document
 from selfmotion.shell.cli import documents, options, result_json
 from selfmotion.shell.cli.app import (
     PLAN,
@@ -23,8 +23,6 @@ from selfmotion.shell.cli.app import (
 from selfmotion.shell.documents import SeamJob, belonging, moved_workpiece
 from selfmotion.work.batch import processes
 
-# Suffixes of problem files.
-_PROBLEM_SUFFIXES = (".toml", ".json")
 # Suffixes of pages and pictures.
 _PAGE_SUFFIXES = (".html", ".png")
 
@@ -57,7 +55,7 @@ def place(
 ) -> None:
     """Find the place of the part, or of the arm, at which the motions cost least.
 
-    Of problem files of one arm, or of the problems of plans (.npz). Problem files (.toml, .json)
+    Of problem files of one arm, or of the problems of plans (.npz). Problem files
     and plans (.npz) are written as --out, of several problems numbered.
     Of a job all seams are placed together, and a job file is written. What stands in the frame of
     a file's workpiece belongs to the part.
@@ -144,7 +142,7 @@ class _Asked:
                 "--part and --of path say different things; give one of them"
             )
         for file in [*self.out, *drawn]:
-            suffixes = (*_PROBLEM_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
+            suffixes = (*DOCUMENT_SUFFIXES, ".npz") if file in self.out else _PAGE_SUFFIXES
             if file.suffix not in suffixes:
                 raise sm.errors.FileFormatError(
                     f"{file}: expected a name that ends in {', '.join(suffixes)}"
@@ -219,9 +217,9 @@ def _check_placed_jobs(job: Path, out: Sequence[Path], base: bool) -> None:
                 f"{file}: a job whose arm's base is moved is not written; set robot.base to the "
                 f"place that is found"
             )
-        if file.suffix not in _PROBLEM_SUFFIXES or file.resolve().parent != job.resolve().parent:
+        if file.suffix not in DOCUMENT_SUFFIXES or file.resolve().parent != job.resolve().parent:
             raise sm.errors.FileFormatError(
-                f"{file}: expected a job file ({', '.join(_PROBLEM_SUFFIXES)}) beside {job}, whose "
+                f"{file}: expected a job file ({', '.join(DOCUMENT_SUFFIXES)}) beside {job}, whose "
                 f"files it names"
             )
 

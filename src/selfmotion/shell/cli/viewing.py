@@ -6,13 +6,14 @@ from typing import Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion.shell.cli import documents, jobs, options, outputs, parts
+from selfmotion.basics import DOCUMENT_SUFFIXES
+from selfmotion.shell.cli import jobs, options, outputs, parts
 from selfmotion.shell.cli.app import LOOK, app, stages, terminal
 from selfmotion.shop import controllers
 
 # What a page can show.
 _SUFFIXES = (
-    *(*documents.SUFFIXES, ".yaml", ".yml"),
+    *DOCUMENT_SUFFIXES,
     *(".npz", jobs.PROGRAM, parts.PARTS, *controllers.READ_PROGRAMS),
 )
 
