@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 import shown
 import two_motions
+from markdown import markdown
+from mathml import MathMl
 
 import selfmotion as sm
 from support.places import ROOT
@@ -107,6 +109,23 @@ def test_what_pages_take_from_files_is_marked_there(page: str) -> None:
 
 def test_a_section_that_is_not_marked_is_told() -> None:
     assert unmarked('--8<-- "README.md:first"\n--8<-- "README.md:last"\n') == ["README.md:last"]
+
+
+def not_drawn(text: str) -> list[str]:
+    """Return what stands after each dollar that belongs to no equation, code left out."""
+    html = markdown(text, extensions=["tables", "fenced_code", MathMl()])
+    prose = re.sub(r"<(pre|code)\b.*?</\1>", "", html, flags=re.DOTALL)
+    return re.findall(r"\$[^$]{0,40}", prose)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_equations_of_pages_are_drawn(page: str) -> None:
+    assert not_drawn((ROOT / page).read_text()) == []
+
+
+def test_an_equation_on_two_lines_is_told() -> None:
+    assert not_drawn("With $a + b$ and\n$c$.\n") == []
+    assert not_drawn("With $a +\nb$.\n") != []
 
 
 def test_what_is_not_run_is_there() -> None:
