@@ -145,7 +145,7 @@ class Live {
       : message.kind === "early" ? "early" : "verified";
   }
 
-  // Where else what is dragged could stand: green on the ground.
+  // Where else what is dragged could stand: green on the ground, seen through what stands on it.
   drawFloor(floor) {
     const { stage, content } = this.page;
     stage?.viewer.remove(FLOOR);
@@ -161,8 +161,8 @@ class Live {
     }
     const squares = new THREE.Mesh(
       surface({ vertices: new Float32Array(vertices), triangles: new Uint32Array(triangles) }),
-      new THREE.MeshBasicMaterial({ color: 0x2ea043, transparent: true, opacity: 0.35, depthWrite: false }));
-    stage.find(FLOOR).add(squares);
+      new THREE.MeshBasicMaterial({ color: 0x2ea043, transparent: true, opacity: 0.35, depthTest: false }));
+    stage.find(FLOOR).add(Object.assign(squares, { renderOrder: 1 }));
     stage.viewer.draw();
   }
 
