@@ -256,8 +256,7 @@ class FeedNodes:
             before, later = np.append(lengths[0], lengths[:-1]), np.append(lengths[1:], lengths[-1])
         first = np.searchsorted(lengths, before - reach)
         after = np.searchsorted(lengths, later + reach, side="right")
-        pairs = zip(first, after, strict=True)
-        return np.array([k + int(np.argmin(most[k:m])) for k, m in pairs])
+        return least_within(most, first, after)
 
     @cached_property
     def _gain(self) -> Array:
@@ -288,6 +287,27 @@ class FeedNodes:
     @property
     def _half(self) -> Array:
         return 0.5 * np.array([self.limits["acceleration"], self.limits["turn_acceleration"]])
+
+
+def least_within(values: Array, first: Ints, after: Ints) -> Ints:
+    """Return the place of the first least value (K,) in each range from `first` to before `after`.
+
+    By the least of all ranges of 1, 2, 4, … values: of two of these that overlap each range is
+    made (M. A. Bender, M. Farach-Colton, "The LCA problem revisited", 2000).
+    """
+    size = np.frexp(after - first)[1] - 1
+    places, least = np.empty(len(first), dtype=np.int64), np.arange(len(values))
+    for level in range(int(size.max(initial=-1)) + 1):
+        if level:
+            least = _lesser(values, least[: -(1 << level - 1)], least[1 << level - 1 :])
+        own = size == level
+        places[own] = _lesser(values, least[first[own]], least[after[own] - (1 << level)])
+    return places
+
+
+def _lesser(values: Array, places: Ints, others: Ints) -> Ints:
+    """Return of each two places the one with the lesser value, the former where they are equal."""
+    return np.where(values[others] < values[places], others, places)
 
 
 def twist_sizes(twists: Array) -> Array:
