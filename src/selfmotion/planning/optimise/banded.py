@@ -54,9 +54,9 @@ _ROOM_FIRST = 0.5
 _ROOM_LATER = 0.2
 # … or, where some are violated by more, those violated by this share of the worst.
 _SHARE_OF_WORST = 0.5
-# Programmes with a part of the rows; then one with all. Where a second part does not do, as in the
-# first step from a pace that is far off, ten parts do not either, and take twice as long as all.
-_ROUNDS = 2
+# Programmes with a part of the rows; then one with all. Where four do not do, as in first steps of
+# short moves, twelve do not either, and take twice as long as all rows.
+_ROUNDS = 4
 # Largest violation of a row that was left out, relative to its limit.
 _VIOLATED = 1e-5
 # Neighbours on both sides that are added with each violated row; with fewer, the violation only
