@@ -20,6 +20,8 @@ from support.shell import complaint, invoke
 # What the tool is off its path: the middle rule's error over cycles of 1 ms.
 TRACKED = 1e-5
 PERIOD, STEPS = 0.01, 60
+# The same where limits hold the tool back [m].
+LATE = 1e-3
 
 CELL = """
 task = "pose"
@@ -155,6 +157,25 @@ def test_when_the_tool_was_off_its_path_is_told(tmp_path: Path) -> None:
     assert first < last < 80 * PERIOD
     assert found["limits kept"]
     assert found["limits used"]["acceleration"] > 0.0
+
+
+def test_by_how_much_the_tool_is_late_is_told(tmp_path: Path) -> None:
+    """On a path that is faster than the limits the tool stays on it, late."""
+    file, port = written(tmp_path), free_port()
+    file.write_text(file.read_text().replace("duration = 3.0", "duration = 0.5"))
+    controller = Controller(port)
+    controller.start()
+    _, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}", "--json")
+    controller.join(10.0)
+    found = json.loads(shown[shown.index("{") :])
+    t, q = controller.passed[-1]
+    path, arm = sm.read_problem(file).path, robot_named("panda")
+    # The arm stands where the path was by so much earlier; a segment's delay is that of its start.
+    late = t - PERIOD - found["delay at the end"]
+    assert 0.0 < found["delay at the end"] <= found["largest delay"]
+    moved = arm.pose(controller.passed[-2][1]).translation - path.pose(late).translation
+    assert np.linalg.norm(moved) < LATE
+    assert np.abs(q - PANDA_HOME).max() > 0.01
 
 
 def test_a_controller_that_is_silent_ends_it(tmp_path: Path) -> None:

@@ -121,6 +121,7 @@ class Link:
     lengths: Counter[int] = field(default_factory=Counter)
     used: Array = field(default_factory=lambda: np.zeros(3))
     off: list[list[float]] = field(default_factory=list)
+    delays: list[float] = field(default_factory=list)
     ended: str = ""
     _peer: Any = None
     _first: float = 0.0
@@ -164,6 +165,7 @@ class Link:
         self.flags[segment.flag.value] += 1
         self.reasons.update(segment.reasons)
         self.error = np.maximum(self.error, segment.tool_error)
+        self.delays.append(segment.delay)
         self._note_off(segment)
         lower, upper, speed, acceleration = self.limits
         middle, half = 0.5 * (upper + lower), 0.5 * (upper - lower)
@@ -234,6 +236,8 @@ class Link:
             "states left out": self.left_out,
             "lengths left out": {str(size): count for size, count in self.lengths.items()},
             "off the path": [[a, None if np.isnan(b) else b] for a, b in self.off],
+            "largest delay": max(self.delays, default=0.0),
+            "delay at the end": self.delays[-1] if self.delays else 0.0,
             "limits used": dict(zip(_LIMITS, self.used.tolist(), strict=True)),
             "limits kept": bool((self.used <= _FULL).all()),
             "largest position error": float(self.error[0]),
@@ -316,6 +320,9 @@ def show_link(link: Link, console: Console) -> None:
                 break
             back = "to the end" if np.isnan(last) else f"to {last:.3g} s, then back on it"
             table.add_row("", f"farther than 0.1 mm or 1 mrad from t = {first:.3g} s {back}")
+        latest, last = found["largest delay"], found["delay at the end"]
+        if latest > 0.0:
+            table.add_row("late on the path", f"at most {latest:.3g} s, {last:.3g} s at the end")
         said = "kept" if found["limits kept"] else "NOT kept"
         shares = ", ".join(f"{name} {share:.0%}" for name, share in found["limits used"].items())
         table.add_row("limits of the joints", f"{said} by all commands; used: {shares}")
