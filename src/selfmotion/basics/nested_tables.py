@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics.errors import FileFormatError, nearest
-from selfmotion.basics.files import DOCUMENT_SUFFIXES, write_text
+from selfmotion.basics.files import DOCUMENT_SUFFIXES, lines_of, write_text
 from selfmotion.basics.inputs import TURN, is_number
 
 # Keys of poses, tolerances and loads that may end in _deg or _mm.
@@ -41,14 +41,18 @@ def read_document(file: Path) -> dict[str, Any]:
 
 def read_values(file: Path) -> Any:
     """Read a table, or a list; see `read_document`."""
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
     if file.suffix not in DOCUMENT_SUFFIXES:
         raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml, .json or .yaml")
     try:
-        found = _parse(file, file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FileFormatError(f"{file}: is not UTF-8 text: {error}") from error
+    # TOML has no lines that end in a carriage return alone.
+    found = _parse(file, "\n".join(lines_of(text)))
     level = [found]
     for _ in range(_DEEPEST):
         inner = [list(item.values()) if isinstance(item, dict) else item for item in level]
