@@ -500,8 +500,8 @@ def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
     program.save(tmp_path / "a.program")
     sm.files.write_motion(program, file, settings=settings("weld.mod"))
     read = read_program(file, ur5)
-    assert read.within is None
-    assert read.timed == (
+    assert read.feed_tolerance is None
+    assert read.timed_reasons == (
         "an event is where the tool is slower than its feed, or it is at no feed",
     )
     assert judge_program(file, program).verified
@@ -637,7 +637,7 @@ def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     file = tmp_path / "weld.mod"
     near = sm.Tolerance(2e-6, 2e-4)
     sm.files.write_motion(plan, file, settings=settings("weld.mod", deviation=near))
-    (told,) = read_program(file, abb).timed
+    (told,) = read_program(file, abb).timed_reasons
     found = re.search(r"near t = ([0-9.]+) s, at \(([-0-9., ]+)\) m, no poses", told)
     assert found is not None
     assert "tolerance = 0.002" in told
@@ -649,4 +649,4 @@ def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     assert np.linalg.norm(seam.pose(float(found[1])).translation - at) < 2e-3
     # Where more is allowed it is at its feed.
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
-    assert not read_program(file, abb).timed
+    assert not read_program(file, abb).timed_reasons

@@ -241,8 +241,8 @@ def _chords_of(
     if entity.dxftype() not in ENTITY_TYPES:
         raise FileFormatError(
             f"{file}: layer '{layer}': {label} is not read, expected {', '.join(ENTITY_TYPES)} or "
-            f"blocks of them; explode it in CAD, delete it, switch its layer off, or choose the seam "
-            f"of another layer"
+            f"blocks of them; explode it in CAD, delete it, switch its layer off, or choose the "
+            f"seam of another layer"
         )
     try:
         drawn = np.array(entity_points(entity, _CHORD_TOLERANCE / unit), dtype=np.float64)
