@@ -142,13 +142,12 @@ class Replanner:
         steps = as_whole(steps, "steps", null_motion.fewest_steps, _MAX_STEPS)
         mean = cycles_of_mean(robot, envelope, self.cycle)
         self._clearance = MovingClearance(robot, envelope.bodies) if envelope.bodies else None
-        self._quantities: Quantities | None = None
-        if any(is_quantity(item) for item in constraints):
-            jerk = 2.0 / (mean * self.cycle) * limits[3]
-            fastest = np.stack([limits[2], limits[3], jerk])
-            quantities = [item for item in constraints if is_quantity(item)]
-            self._quantities = Quantities(robot, quantities, fastest, self.cycle)
-
+        jerk = 2.0 / (mean * self.cycle) * limits[3]
+        fastest = np.stack([limits[2], limits[3], jerk])
+        quantities = [item for item in constraints if is_quantity(item)]
+        self._quantities = (
+            Quantities(robot, quantities, fastest, self.cycle) if quantities else None
+        )
         # Number of cycles of a segment that follow the path, and their times from now on.
         period_cycles = round(self.period / self.cycle)
         self._cycles = period_cycles + round(reserve / self.cycle)
@@ -180,10 +179,7 @@ class Replanner:
         )
         self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
         self._reach = Reach(self._kinematics, self.task, limits[0], limits[1], dexterous)
-        approach = approach or Approach()
-        for item in constraints:
-            if isinstance(item, ToolLimits):
-                approach = approach.within(item.limit)
+        approach = _approach_within(approach or Approach(), constraints)
         times, self._stages = self._step_times()
         self._reference = Reference(follows, approach, times)
         self._path = PacedPath(
@@ -200,19 +196,6 @@ class Replanner:
         # Reference and ε of each cycle; see `law.command`.
         self._table = np.zeros((self._cycles, 2 * robot.dof + law.REFERENCE))
         self._started = False
-
-    def _step_times(self) -> tuple[Array, Array]:
-        """Return the times of a step from now on (K,) [s], and which are Runge-Kutta stages.
-
-        The times are nodes of the horizon and the middles between them, then the cycles that are
-        commanded; four stages of each Runge-Kutta step are among the first.
-        """
-        grid = self._horizon.grid
-        half_steps = np.arange(2 * grid.steps + 1)
-        nodes_and_middles = np.interp(half_steps, 2 * np.arange(grid.steps + 1), grid.nodes)
-        stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
-        times = np.concatenate([nodes_and_middles, self._ahead])
-        return times, np.append(stages.ravel(), 2 * grid.steps)
 
     def reset(self) -> None:
         """Reset: the next step starts at its measured state."""
@@ -302,6 +285,19 @@ class Replanner:
             path, age = None, 0.0
         with one_blas_thread():
             return self._step(t, q, qd, poses or path, max(age, 0.0), obstacles or {}, reasons)
+
+    def _step_times(self) -> tuple[Array, Array]:
+        """Return the times of a step from now on (K,) [s], and which are Runge-Kutta stages.
+
+        The times are nodes of the horizon and the middles between them, then the cycles that are
+        commanded; four stages of each Runge-Kutta step are among the first.
+        """
+        grid = self._horizon.grid
+        half_steps = np.arange(2 * grid.steps + 1)
+        nodes_and_middles = np.interp(half_steps, 2 * np.arange(grid.steps + 1), grid.nodes)
+        stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
+        times = np.concatenate([nodes_and_middles, self._ahead])
+        return times, np.append(stages.ravel(), 2 * grid.steps)
 
     def _step(
         self,
@@ -476,3 +472,11 @@ class Replanner:
         self._as_planned = follows or flag is Flag.STOPPING
         self._path.is_held = not follows
         return segment
+
+
+def _approach_within(approach: Approach, constraints: Sequence[Constraint]) -> Approach:
+    """Return an approach that is no faster than limits of the tool allow."""
+    for item in constraints:
+        if isinstance(item, ToolLimits):
+            approach = approach.within(item.limit)
+    return approach
