@@ -97,6 +97,14 @@ class PacedPath:
         """Whether the tool waits on its path."""
         return bool(self._pace.rates[0] < STANDING and self._pace.delay > RIGHT_AHEAD)
 
+    def go_on(self, seconds: float) -> None:
+        """Let time pass [s]."""
+        self._pace.shift(seconds)
+
+    def hold_rates(self) -> None:
+        """Let the path go on at the present rates until the next step, whatever is planned."""
+        self._pace.command()
+
     def joined(self, chunk: Chunk, t: float, reasons: list[str]) -> Path:
         """Return a chunk joined to what is followed; alone where that fails, and add the reason.
 

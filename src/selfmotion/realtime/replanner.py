@@ -319,7 +319,7 @@ class Replanner:
         may_move = self._measure(measured_state(q, dof), passed, reasons)
         if self._clearance is not None:
             self._clearance.move(obstacles, self._commands.place)
-        self._horizon.pace.shift(passed)
+        self._path.go_on(passed)
         target = self._path.target(path, max(passed, self.cycle), age, reasons)
         error, flag = np.zeros(2), Flag.STOPPING
         if target is not None:
@@ -396,11 +396,13 @@ class Replanner:
         commands, horizon = self._commands, self._horizon
         rate, place = commands.rate, commands.place
         for retreats in range(RETREATS + 1):
-            horizon.pace.command()
+            self._path.hold_rates()
             error = self._reference.begin(place, rate, target.path, twist)
             failure = self._improve(place, rate, target)
             breakdown = min(horizon.breakdown, horizon.damped)
-            if not self._path.retreat(target, breakdown, retreats) or not failure:
+            is_slower = self._path.retreat(target, breakdown, retreats)
+            # A plan that did not fail is kept; the next step begins slower.
+            if not (is_slower and failure):
                 break
             target = self._path.again() or target
         return error, failure
