@@ -26,7 +26,7 @@ MOVED = {
     "transfer": "planning.transfer",
     "warm": "realtime.warm",
 }
-# The same of modules.
+# Former module → present one.
 MOVED_MODULES = {
     "model.follow.augmented": "model.follow.relaxed",
     "planning.nodes.samples": "planning.formulation.sampled",
@@ -57,27 +57,26 @@ MOVED_MODULES = {
 
 
 class MovedModules:
-    """Finds no module, and says of those that have moved where they are."""
+    """A finder of the import system: finds no module, but says where moved ones are."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Raise ModuleNotFoundError with the new path of a moved module; else find nothing."""
-        house, *parts = name.split(".")
-        if house == "selfmotion" and (module := MOVED_MODULES.get(".".join(parts))):
-            raise ModuleNotFoundError(f"{name} is {house}.{module} now", name=name)
-        if house != "selfmotion" or not parts or parts[0] not in MOVED:
+        top, *parts = name.split(".")
+        if top != "selfmotion" or not parts:
             return None
-        now = f"{house}.{MOVED[parts[0]]}"
-        if name.startswith(now):
+        if module := MOVED_MODULES.get(".".join(parts)):
+            raise ModuleNotFoundError(f"{name} is {top}.{module} now", name=name)
+        if parts[0] not in MOVED:
             return None
-        now = ".".join([now, *parts[1:]])
-        try:
-            is_there = find_spec(now) is not None
-        except ModuleNotFoundError:
-            is_there = False
-        if is_there:
-            raise ModuleNotFoundError(f"{name} is {now} now", name=name)
+        new_package = f"{top}.{MOVED[parts[0]]}"
+        # A package that has moved into itself: the name is of the present one.
+        if name.startswith(new_package):
+            return None
+        new_name = ".".join([new_package, *parts[1:]])
+        if _exists(new_name):
+            raise ModuleNotFoundError(f"{name} is {new_name} now", name=name)
         return None
 
 
@@ -85,3 +84,10 @@ def tell_moved() -> None:
     """Register `MovedModules`, which is used only after all other finders fail."""
     if not any(isinstance(each, MovedModules) for each in sys.meta_path):
         sys.meta_path.append(MovedModules())
+
+
+def _exists(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False

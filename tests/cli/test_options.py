@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import selfmotion as sm
 from selfmotion.shell.cli import app
 from selfmotion.shell.cli.documents import DocumentOptions, read
-from selfmotion.shell.cli.moved import MOVED, moved
+from selfmotion.shell.cli.moved import MOVED, replacement
 from selfmotion.shell.documents import json_schema, keys_of, parse_setting, set_key
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke, on_circle, on_line
@@ -237,7 +237,7 @@ def test_an_example_takes_keys_of_the_arm_and_its_links_alone(tmp_path: Path) ->
 
 def test_options_are_declared_once() -> None:
     """Each option that several commands share is one declaration, and all are few."""
-    folder = Path(inspect.getfile(moved)).parent
+    folder = Path(inspect.getfile(replacement)).parent
     text = "".join(file.read_text() for file in folder.glob("*.py"))
     assert len(re.findall(r"typer\.(?:Option|Argument)\(", text)) <= 60
 

@@ -18,7 +18,8 @@ from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import judge_program, program_deviation, read_program
 from selfmotion.shop.controllers.arcs import arc_through
 from selfmotion.shop.controllers.controller_axes import axes_of
-from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, Ramps, times_at
+from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, nominal_target_times
+from selfmotion.shop.controllers.ramps import Ramps
 from support.arms import robot_named
 from support.industrial import industrial_arm
 from support.played_programs import Off, off, read_poses
@@ -424,7 +425,7 @@ def test_clearances_decide_how_far_the_arm_may_be_off(abb: sm.RobotModel, tmp_pa
 def test_even_ramps_take_what_is_planned(seconds: float) -> None:
     ramps = Ramps(1.0, seconds)
     times = np.linspace(0.0, seconds, 501)
-    passed = ramps.passed(times)
+    passed = ramps.nominal_times(times)
     assert passed[0] == 0.0
     assert passed[-1] == pytest.approx(1.0, abs=1e-12)
     assert (np.diff(passed) > 0.0).all()
@@ -499,8 +500,8 @@ def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
     program.save(tmp_path / "a.program")
     sm.files.write_motion(program, file, settings=settings("weld.mod"))
     read = read_program(file, ur5)
-    assert read.within is None
-    assert read.timed == (
+    assert read.feed_tolerance is None
+    assert read.timed_reasons == (
         "an event is where the tool is slower than its feed, or it is at no feed",
     )
     assert judge_program(file, program).verified
@@ -533,7 +534,7 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
     whole = stretch_of(file, abb)
     alone = replace(
         whole,
-        t=times_at(whole.positions[[0, -1]], whole.vias[:1], whole.speeds[:1]),
+        t=nominal_target_times(whole.positions[[0, -1]], whole.vias[:1], whole.speeds[:1]),
         q=whole.q[[0, -1]],
         positions=whole.positions[[0, -1]],
         quaternions=whole.quaternions[[0, -1]],
@@ -637,7 +638,7 @@ def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     file = tmp_path / "weld.mod"
     near = sm.Tolerance(2e-6, 2e-4)
     sm.files.write_motion(plan, file, settings=settings("weld.mod", deviation=near))
-    (told,) = read_program(file, abb).timed
+    (told,) = read_program(file, abb).timed_reasons
     found = re.search(r"near t = ([0-9.]+) s, at \(([-0-9., ]+)\) m, no poses", told)
     assert found is not None
     assert "tolerance = 0.002" in told
@@ -649,4 +650,4 @@ def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     assert np.linalg.norm(seam.pose(float(found[1])).translation - at) < 2e-3
     # Where more is allowed it is at its feed.
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
-    assert not read_program(file, abb).timed
+    assert not read_program(file, abb).timed_reasons

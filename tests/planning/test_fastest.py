@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.planner.fastest import _KeptCosts
+from selfmotion.planning.planner.cost_limits import CostLimits
 from support.arms import PANDA_HOME, robot_named
 
 # What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by
@@ -101,18 +101,18 @@ def test_costs_are_kept_at_the_time_law_of_the_path() -> None:
     """No cheaper than asked, no slower than retiming; what nothing costs is named."""
     problem = slow_line()
     best, cost = sm.plan(problem), sm.costs.JointVelocity()
-    kept = _KeptCosts.of(problem, {cost.kind: KEPT})
+    limits = CostLimits.of(problem, {cost.kind: KEPT})
 
     def twice(stage: str, done: int, total: int) -> None:
         if stage == "fastest" and done == 2:
             raise KeyboardInterrupt
 
     found = sm.fastest(problem, keep={cost.kind: KEPT}, progress=twice)
-    assert kept.values(best) == pytest.approx(best.report.cost, rel=SAME)
-    assert kept.values(found.plan) <= KEPT * best.report.cost * (1.0 + SAME)
+    assert limits.values(best) == pytest.approx(best.report.cost, rel=SAME)
+    assert limits.values(found.plan) <= KEPT * best.report.cost * (1.0 + SAME)
     assert found.duration <= found.retimed
     # At another pace the same joint path costs the same.
-    assert kept.values(sm.retime(best)) == pytest.approx(best.report.cost, rel=SAME)
+    assert limits.values(sm.retime(best)) == pytest.approx(best.report.cost, rel=SAME)
     with pytest.raises(sm.errors.ProblemError, match="no cost 'PathLength', but JointVelocity"):
         sm.fastest(problem, keep={"PathLength": 1.1})
     with pytest.raises(sm.errors.ProblemError, match="keep: JointVelocity"):

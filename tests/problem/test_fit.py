@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 import selfmotion as sm
-from selfmotion.problem.problem.fit import check_relaxations
+from selfmotion.problem.problem.relaxation_checks import check_relaxations
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def loop(
         now = segment.index(t)
         commands.append(np.stack([segment.q, segment.qd, segment.qdd], axis=1)[:now])
         q, qd = segment.q[now], segment.qd[now]
-        places.append((t, q, replanner._path.path))
+        places.append((t, q, replanner._path.last.path))
     return segments, np.concatenate(commands), places
 
 
@@ -205,7 +205,7 @@ def test_a_chunk_after_a_stop_is_followed_again() -> None:
         t += replanner.period
         q = segment.q[segment.index(t)]
         assert segment.flag is Flag.PLANNED
-    assert max(sm.Task.POSE.miss(replanner._path.path.pose(t), panda.pose(q))) <= 1e-3
+    assert max(sm.Task.POSE.miss(replanner._path.last.path.pose(t), panda.pose(q))) <= 1e-3
 
 
 def test_a_chunk_joins_what_a_camera_saw(panda: sm.RobotModel) -> None:
@@ -217,7 +217,7 @@ def test_a_chunk_joins_what_a_camera_saw(panda: sm.RobotModel) -> None:
     times = np.array([0.5, 1.0, 1.5])
     segment = replanner.step(0.01, q, qd, chunk=[pose_at(t) for t in times], times=times)
     assert segment.flag is Flag.PLANNED
-    held = replanner._path.path
+    held = replanner._path.last.path
     assert np.abs(held.samples([0.3]).twist - seen.samples([0.3]).twist).max() <= 1e-12
 
 

@@ -1,7 +1,5 @@
 """When the search looks at the path."""
 
-import importlib
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,16 +8,13 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import completed, single_tip
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.search import carried, shortest_along
-from selfmotion.planning.search.guides import search_times
+from selfmotion.planning.search import carried, chain_shortening, shortest_along
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.search_bounds import SearchBounds
+from selfmotion.planning.search.search_times import STRIDE, search_times
 from selfmotion.planning.search.shortest import Shortest
 from support.arms import PANDA_HOME
 from support.stretching import DURATION, rounded_problem, stretching
-
-# A function of its door has the same name.
-guides = importlib.import_module("selfmotion.planning.search.guides")
 
 
 def level(x: float, y: float) -> pin.SE3:
@@ -52,11 +47,11 @@ def test_the_search_looks_as_the_tool_moves_on() -> None:
 @pytest.mark.parametrize("strides", [150.01, 199.99, 250.5])
 def test_no_stride_of_the_search_is_longer_than_the_longest(strides: float) -> None:
     """And there are no more times than that takes."""
-    length = strides * guides._STRIDE
+    length = strides * STRIDE
     line = sm.paths.Line(level(0.0, 0.0), level(length, 0.0), 3.0, time_law="constant")
     t = search_times(line, 2)
     assert len(t) == np.ceil(strides) + 1
-    assert np.diff(line.samples(t).translation[:, 0]).max() <= guides._STRIDE * (1.0 + 1e-9)
+    assert np.diff(line.samples(t).translation[:, 0]).max() <= STRIDE * (1.0 + 1e-9)
 
 
 def test_chains_keep_a_little_of_limits_and_speeds_for_what_is_between_waypoints(
@@ -74,7 +69,7 @@ def test_chains_keep_a_little_of_limits_and_speeds_for_what_is_between_waypoints
             noted.append((bounds, steps))
             super().__init__(waypoints, bounds, steps, weights)
 
-    monkeypatch.setattr(guides, "Shortest", Noted)
+    monkeypatch.setattr(chain_shortening, "Shortest", Noted)
     t = np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0])
     motions, arrived = carried(formulation.follows, start[None], t)
     assert arrived.all()

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import (
-    Array,
-    as_number,
-    as_whole,
-    one_blas_thread,
-)
+from selfmotion.basics import Array, as_number, as_whole, one_blas_thread
 from selfmotion.model.follow import Follows, single_tip
 from selfmotion.model.motion import NullMotion, PolynomialNullMotion
 from selfmotion.model.path import Dwell, Path, PathSamples
@@ -31,7 +26,7 @@ from selfmotion.realtime.checks import (
     measured_state,
     observed_target,
 )
-from selfmotion.realtime.chunks import Chunk, blend
+from selfmotion.realtime.chunks import Chunk
 from selfmotion.realtime.commands import (
     Commands,
     cycles_of_mean,
@@ -39,29 +34,19 @@ from selfmotion.realtime.commands import (
     kept_envelope,
     planned_limits,
 )
-from selfmotion.realtime.horizon import Horizon, is_damped
+from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.moving_clearance import MovingClearance
-from selfmotion.realtime.pace import LastPath, Sampled, Times
+from selfmotion.realtime.pace import Sampled
+from selfmotion.realtime.paced_path import PacedPath
+from selfmotion.realtime.proved_stop import ProvedStop
 from selfmotion.realtime.quantities import Quantities, is_quantity
+from selfmotion.realtime.reach import Reach
 from selfmotion.realtime.reference import Approach, Reference
 from selfmotion.realtime.segment import Flag, Segment
-from selfmotion.realtime.settings import (
-    AHEAD,
-    CATCH_UP,
-    GENTLER,
-    GENTLEST,
-    HARDER,
-    JUMPED,
-    LARGEST,
-    LONGEST_STOP,
-    REACHED,
-    REACHING,
-    RETREATS,
-    RIGHT_AHEAD,
-    SOON,
-    STANDING,
-    UNNOTICED,
-)
+from selfmotion.realtime.settings import AHEAD, LONGEST_STOP, RETREATS, SOON
+
+# Largest number of Runge-Kutta steps of a horizon.
+_MAX_STEPS = 1000
 
 
 class Replanner:
@@ -146,24 +131,26 @@ class Replanner:
         settling = as_number(settling, "settling", above=0.0)
         latency = as_number(latency, "latency", least=0.0)
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
-        self._dexterous = robot.dexterous_configuration()
-        somewhere = Dwell(robot.pose(self._dexterous), self.horizon)
+        dexterous = robot.dexterous_configuration()
+        somewhere = Dwell(robot.pose(dexterous), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = checked_terms(follows, costs, constraints)
         envelope = kept_envelope(robot, constraints)
         limits = joint_limits(robot, envelope)
         self.limits, self.jerk_limit = limits[:4], envelope.jerk
         null_motion = check_null_space(null_motion or PolynomialNullMotion())
-        steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
-        self._clearance = MovingClearance(robot, envelope.bodies) if envelope.bodies else None
+        steps = as_whole(steps, "steps", null_motion.fewest_steps, _MAX_STEPS)
         mean = cycles_of_mean(robot, envelope, self.cycle)
-        others, jerk = (
-            [item for item in constraints if is_quantity(item)],
-            2.0 / (mean * self.cycle),
+        self._clearance = MovingClearance(robot, envelope.bodies) if envelope.bodies else None
+        jerk = 2.0 / (mean * self.cycle) * limits[3]
+        fastest = np.stack([limits[2], limits[3], jerk])
+        quantities = [item for item in constraints if is_quantity(item)]
+        self._quantities = (
+            Quantities(robot, quantities, fastest, self.cycle) if quantities else None
         )
-        fastest = np.stack([limits[2], limits[3], jerk * limits[3]])
-        self._quantities = Quantities(robot, others, fastest, self.cycle) if others else None
-        self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
+        # Number of cycles of a segment that follow the path, and their times from now on.
+        period_cycles = round(self.period / self.cycle)
+        self._cycles = period_cycles + round(reserve / self.cycle)
         self._ahead = self.cycle * np.arange(1.5, self._cycles + 1.0)
         self._horizon = Horizon(
             follows,
@@ -176,8 +163,7 @@ class Replanner:
             self._clearance,
             self._quantities,
         )
-        self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
-        gentler = self._quantities is not None and self._quantities.by_acceleration
+        by_acceleration = self._quantities is not None and self._quantities.by_acceleration
         self._commands = Commands(
             robot,
             limits,
@@ -186,27 +172,30 @@ class Replanner:
             latency,
             settling,
             mean,
-            LONGEST_STOP if gentler else 0.0,
+            LONGEST_STOP if by_acceleration else 0.0,
         )
-        self._gentlest, self._share = GENTLEST if gentler else 1.0, 1.0
-        self._prepare()
-        self._approach = approach or Approach()
-        for item in constraints:
-            if isinstance(item, ToolLimits):
-                self._approach = self._approach.within(item.limit)
-        self._reference = Reference(follows, self._approach, self._times)
+        self._stop = ProvedStop(
+            self._commands, self._clearance, self._quantities, period_cycles, self.cycle
+        )
+        self._kinematics, self._layout = single_tip(follows).chain.kinematics(), follows.layout
+        self._reach = Reach(self._kinematics, self.task, limits[0], limits[1], dexterous)
+        approach = _approach_within(approach or Approach(), constraints)
+        times, self._stages = self._step_times()
+        self._reference = Reference(follows, approach, times)
+        self._path = PacedPath(
+            self.task,
+            self._kinematics,
+            self._commands,
+            self._horizon.pace,
+            self._reach,
+            approach,
+            times,
+            len(times) - self._cycles,
+            self._patience,
+        )
+        # Reference and ε of each cycle; see `law.command`.
+        self._table = np.zeros((self._cycles, 2 * robot.dof + law.REFERENCE))
         self._started = False
-
-    def _prepare(self) -> None:
-        """Make all tables of a step, for the cycles that follow the path."""
-        n, grid, cycles = self.robot.dof, self._horizon.grid, self._cycles
-        self._table = np.zeros((cycles, 2 * n + law.REFERENCE))
-        halves = np.interp(np.arange(2 * grid.steps + 1), 2 * np.arange(grid.steps + 1), grid.nodes)
-        self._times = np.concatenate([halves, self._ahead])
-        self._pace, self._paced = self._horizon.pace, self._horizon.pace.weights(self._times)
-        # Stages of the Runge-Kutta method among nodes and middles.
-        stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
-        self._stages = np.append(stages.ravel(), 2 * grid.steps)
 
     def reset(self) -> None:
         """Reset: the next step starts at its measured state."""
@@ -297,6 +286,19 @@ class Replanner:
         with one_blas_thread():
             return self._step(t, q, qd, poses or path, max(age, 0.0), obstacles or {}, reasons)
 
+    def _step_times(self) -> tuple[Array, Array]:
+        """Return the times of a step from now on (K,) [s], and which are Runge-Kutta stages.
+
+        The times are nodes of the horizon and the middles between them, then the cycles that are
+        commanded; four stages of each Runge-Kutta step are among the first.
+        """
+        grid = self._horizon.grid
+        half_steps = np.arange(2 * grid.steps + 1)
+        nodes_and_middles = np.interp(half_steps, 2 * np.arange(grid.steps + 1), grid.nodes)
+        stages = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
+        times = np.concatenate([nodes_and_middles, self._ahead])
+        return times, np.append(stages.ravel(), 2 * grid.steps)
+
     def _step(
         self,
         t: float,
@@ -307,118 +309,36 @@ class Replanner:
         obstacles: Mapping[str, SE3],
         reasons: list[str],
     ) -> Segment:
+        """Return the next segment: measure, plan, command, and prove what is commanded."""
         dof = self.robot.dof
         if not self._started:
             self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
         if isinstance(path, Chunk):
-            path = self._joined(path, t, reasons)
-        q, qd = measured_state(q, dof), measured_state(qd, dof)
-        commands = self._commands
-        passed = commands.go_on(t)
-        moving = self._measure(q, passed, reasons)
+            path = self._path.joined(path, t, reasons)
+        passed = self._commands.go_on(t)
+        may_move = self._measure(measured_state(q, dof), passed, reasons)
         if self._clearance is not None:
-            self._clearance.move(obstacles, commands.place)
-        waited = max(passed, self.cycle)
-        self._pace.shift(passed)
-        target = self._target(path, waited, age, reasons)
-        error, flag, follows = np.zeros(2), Flag.STOPPING, False
-        first = 0
+            self._clearance.move(obstacles, self._commands.place)
+        self._path.go_on(passed)
+        target = self._path.target(path, max(passed, self.cycle), age, reasons)
+        error, flag = np.zeros(2), Flag.STOPPING
         if target is not None:
             flag, error = self._plan(target, passed, reasons)
-            if moving and flag is not Flag.STOPPING:
-                follows = commands.follow(self._kinematics, self._layout, self._table)
-                first = self._cycles
-            else:
-                flag = Flag.STOPPING
-        # The command is behind the motion that follows the path.
-        delay = self._pace.delay - commands.lead * (1.0 - float(self._pace.rates[0]))
-        said = tuple(reasons)
-        issued, unproved = self._braked(
-            lambda cycle, share: commands.segment(cycle, flag, said, follows, error, delay, share),
-            first,
-        )
-        if not unproved and self._clearance is not None:
-            unproved = self._clearance.proof_failure(*self._expected(issued))
-        if unproved:
-            # The segment before, which is proved, runs to its stop.
-            reasons.append(unproved)
-            if target is not None and target.along.any():
-                self._refused += 1
-                self._pace.slow_down(self._refused)
-            flag, follows = Flag.STOPPING, False
-            issued = commands.segment(None, flag, tuple(reasons), follows, error, delay)
-        self._refused *= bool(unproved)
-        self._follows = follows or flag is Flag.STOPPING
-        self._held = not follows
-        return issued
-
-    def _joined(self, chunk: Chunk, t: float, reasons: list[str]) -> Path:
-        """Return a chunk joined to what is followed; alone where that fails, with the reason.
-
-        Both may be anything: their exceptions must not leave the arm without a command.
-        """
-        try:
-            return blend(self._path.followed, chunk, t, self._approach)
-        except Exception as error:
-            reasons.append(f"the chunk is not joined: {type(error).__name__}: {error}")
-            return chunk
-
-    def _braked(self, made: Callable[[int, float], Segment], first: int) -> tuple[Segment, str]:
-        """Return a segment that brakes from a cycle on, and why it is not proved.
-
-        "" where all quantities are. Where it is the braking that is not, it is tried more gently,
-        and harder again at the next steps; where it is the path, it is followed for a period only.
-        """
-        share, shortest = self._share, min(first, round(self.period / self.cycle))
-        issued = made(first, share)
-        if self._quantities is None:
-            return issued, ""
-        while found := self._quantities.unproved(issued, self._commands.deviation):
-            if np.isfinite(found.time) and found.time >= first * self.cycle:
-                if share <= self._gentlest:
-                    return issued, found.reason
-                share = max(GENTLER * share, self._gentlest)
-            elif shortest * self.cycle <= found.time < np.inf and first > shortest:
-                first = shortest
-            else:
-                # A stop that takes too long was too gentle.
-                self._share = self._share if np.isfinite(found.time) else min(share / GENTLER, 1.0)
-                return issued, found.reason
-            issued = made(first, share)
-        self._share = min(HARDER * share, 1.0)
-        return issued, ""
-
-    def _expected(self, segment: Segment) -> tuple[Array, Array, Array]:
-        """Return where the arm is expected, path lengths and times of a segment.
-
-        At the expected position: the command plus the present deviation.
-        """
-        place = segment.q + self._commands.deviation
-        return place, segment.travelled, segment.t - segment.t[0]
+        if not may_move:
+            flag = Flag.STOPPING
+        return self._issue(target, flag, error, reasons)
 
     def _start(self, t: float, q: Array, qd: Array) -> None:
+        """Begin at a state of the arm, and forget all that was before."""
         self._commands.begin(t, q, qd)
-        self._path = LastPath(self._patience)
+        # Times without a measured state, and with a singular pose right ahead [s].
         self._without_state = self._without_motion = 0.0
         self._horizon.forget()
-        self._share = 1.0
-        for kept in (self._clearance, self._quantities):
-            if kept is not None:
-                kept.forget()
-        self._pace.reset()
-        self._refused, self._leaves, self._clear = 0, False, q
-        self._follows = self._held = self._started = True
-
-    def _last_reference_twist(self, passed: float) -> Array | None:
-        """Return the last twist of the reference, if limits stopped the tool; else None.
-
-        From the tool's own, nearly zero, it would never be fast enough to leave a singular pose.
-        """
-        cycle = round(passed / self.cycle)
-        if self._follows or not 2 <= cycle <= self._cycles:
-            return None
-        rows = self._table[cycle - 2 : cycle, -6:]
-        return np.asarray(0.5 * (rows[0] + rows[1]))
+        self._stop.reset()
+        self._path.reset()
+        self._reach.last_regular = q
+        # Whether the last segment was as planned: it followed its path, or stopped by its flag.
+        self._as_planned = self._started = True
 
     def _measure(self, q: Array, passed: float, reasons: list[str]) -> bool:
         """Take in a measured position; return whether the arm may go on moving."""
@@ -427,145 +347,67 @@ class Replanner:
             reasons.append("the measured state is missing, or not finite")
             return self._without_state <= self._patience
         self._without_state = 0.0
-        off = self._commands.measure(q, passed)
-        reasons += [off] if off else []
-        return not off
-
-    def _target(
-        self, path: Path | None, waited: float, age: float, reasons: list[str]
-    ) -> Sampled | None:
-        """Return the path at the times of a step, at its pace; None where there is none."""
-        pace = self._pace
-        if not pace.is_on_time and self._path.jumps(path, self._when()):
-            pace.reset()
-        found = self._path.samples(path, self._when(), waited, age, reasons)
-        if found is None or not found.along.any():
-            pace.reset()
-            return found
-        if self._held and found.along[0].any():
-            self._anchor(found, waited)
-            found = self._path.again(self._when())
-        if self._is_met_again():
-            pace.reset()
-            found = self._path.again(self._when())
-        return found
-
-    def _when(self) -> Times:
-        """Return the times of a step, and those of the path then."""
-        commands = self._commands
-        t = commands.time + commands.lead + self._times
-        return self._pace.times(t, self._times, self._paced)
-
-    def _anchor(self, target: Sampled, passed: float) -> None:
-        """Let the path go on where the tool is, which was stopped or held back meanwhile."""
-        commands, task = self._commands, self.task
-        jacobian = self._kinematics.at(commands.place)
-        here = SE3(self._kinematics.rotation, self._kinematics.translation)
-        goal = SE3(target.path.rotation[0], target.path.translation[0])
-        each = target.along[0], -task.twist_error(goal, here), jacobian @ commands.rate
-        along, ahead, rate = (task.select(one[:, None], here.rotation)[:, 0] for one in each)
-        size, off = float(along @ along), np.abs(ahead).max()
-        differs = max(off, np.abs(rate - self._pace.rates[0] * along).max()) > UNNOTICED
-        # Far from its path the tool approaches it, and a path that begins at rest is left to that.
-        if size > 0.0 and differs and off < JUMPED:
-            most = (1.0 + CATCH_UP) * passed
-            early = min(max(float(along @ ahead) / size, -most), most)
-            self._pace.anchor(early, float(along @ rate) / size)
-
-    def _ends(self, target: Sampled, when: float) -> bool:
-        """Return whether a path that has a pace is out of reach right after a time from now."""
-        if not target.along.any():
-            return False
-        s = np.interp(when, self._times[: -self._cycles], self._when().s[: -self._cycles])
-        self._leaves = not all(map(self._reaches, self._poses(s + RIGHT_AHEAD)))
-        return self._leaves
-
-    def _is_met_again(self) -> bool:
-        """Return whether the tool waits where its path leaves reach, and the path is back there."""
-        if self._pace.rates[0] >= STANDING or self._pace.delay < RIGHT_AHEAD:
-            return False
-        return self._leaves and all(map(self._reaches, self._poses(self._commands.time)))
-
-    def _poses(self, *s: float) -> list[SE3]:
-        """Return poses of the last path at times of its own; none where it fails."""
-        found = self._path.again(Times(np.array(s), np.array(s), np.ones(len(s))))
-        if found is None:
-            return []
-        each = zip(found.path.rotation, found.path.translation, strict=True)
-        return [SE3(*pose) for pose in each]
-
-    def _reaches(self, pose: SE3) -> bool:
-        """Return whether Newton's method comes to a pose of the tool.
-
-        From where the arm was on time, or from a dexterous configuration: where it waits, stretched
-        out, it is ill-conditioned. Nor is the arm so near a singular pose there that commands are
-        damped.
-        """
-        kinematics, task = self._kinematics, self.task
-        for q in (self._clear, self._dexterous):
-            for _ in range(REACHING):
-                jacobian = kinematics.at(q)
-                here = SE3(kinematics.rotation, kinematics.translation)
-                rows = task.select(jacobian, here.rotation)
-                error = task.select(task.twist_error(pose, here)[:, None], here.rotation)[:, 0]
-                gram = rows @ rows.T
-                if np.abs(error).max() < REACHED:
-                    if is_damped(gram):
-                        break
-                    return True
-                step = rows.T @ np.linalg.solve(gram + REACHED * np.eye(len(rows)), error)
-                step *= min(1.0, LARGEST / float(np.abs(step).max()))
-                q = np.clip(q + step, self.limits[0], self.limits[1])
-        return False
+        failure = self._commands.measure(q, passed)
+        reasons += [failure] if failure else []
+        return not failure
 
     def _plan(self, target: Sampled, passed: float, reasons: list[str]) -> tuple[Flag, Array]:
-        """Improve the plan; write reference and ε of the cycles into the table.
+        """Improve the plan; return its flag, and how far the tool is off its path [m, rad].
 
-        Returns also how far the tool is off the path. Where a motion breaks down on the way, the
-        path is followed until shortly before that.
+        Writes reference and ε of the cycles into the table.
         """
-        n, horizon, commands = self.robot.dof, self._horizon, self._commands
-        rate, place = commands.rate, commands.place
+        n, horizon = self.robot.dof, self._horizon
         twist = None if target.along.any() else self._last_reference_twist(passed)
         horizon.shift(passed)
-        before = horizon.plan
-        for retreats in range(RETREATS + 1):
-            self._pace.command()
-            error = self._reference.begin(place, rate, target.path, twist)
-            failure = self._improved(place, rate, target)
-            when = min(horizon.breakdown, horizon.damped)
-            if when == np.inf or retreats == RETREATS or not self._ends(target, when):
-                break
-            self._pace.retreat(when)
-            if not failure:
-                break
-            target = self._path.again(self._when()) or target
-        if self._pace.is_on_time and not (failure or horizon.damped < np.inf):
-            self._clear = place
-        flag, epsilon = Flag.PLANNED, horizon.epsilon(before if failure else horizon.plan)
-        if not failure:
-            if self._pace.rates[0] < STANDING and self._pace.delay > RIGHT_AHEAD:
-                reasons.append("the tool waits on its path")
-            if horizon.elastic:
-                reasons.append("no self-motion keeps all limits over the horizon")
-            if self._clearance is not None and self._clearance.blocked:
-                reasons.append(self._clearance.message)
-                flag = Flag.STOPPING
-        else:
+        last_plan = horizon.plan
+        error, failure = self._improve_at_pace(target, twist)
+        if self._path.is_on_time and not (failure or horizon.damped < np.inf):
+            self._reach.last_regular = self._commands.place
+        epsilon = horizon.epsilon(last_plan if failure else horizon.plan)
+        if failure:
             reasons.append(failure)
             horizon.start_anew()
             flag = Flag.KEPT if np.any(epsilon) else Flag.TRACKING
-        # Through a singular pose an arm may continue on its other side.
-        soon = horizon.breakdown < SOON
-        self._without_motion = self._without_motion + max(passed, self.cycle) if soon else 0.0
-        is_stuck = horizon.breakdown < AHEAD and not self._follows
-        if is_stuck or self._without_motion > self._patience:
+        else:
+            flag = self._flag_of_plan(reasons)
+        if self._is_stuck(passed):
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = epsilon
         self._table[:, 2 * n :] = self._reference.table[-self._cycles :]
         return flag, error
 
-    def _improved(self, place: Array, rate: Array, target: Sampled) -> str:
+    def _last_reference_twist(self, passed: float) -> Array | None:
+        """Return the last twist of the reference, if limits stopped the tool; else None.
+
+        From the tool's own, nearly zero, it would never be fast enough to leave a singular pose.
+        """
+        cycle = round(passed / self.cycle)
+        if self._as_planned or not 2 <= cycle <= self._cycles:
+            return None
+        rows = self._table[cycle - 2 : cycle, -6:]
+        return np.asarray(0.5 * (rows[0] + rows[1]))
+
+    def _improve_at_pace(self, target: Sampled, twist: Array | None) -> tuple[Array, str]:
+        """Improve the plan; return the tool's error, and why that failed, or "".
+
+        Where the motion breaks down because the path leaves reach, the path is followed until
+        shortly before.
+        """
+        commands, horizon = self._commands, self._horizon
+        rate, place = commands.rate, commands.place
+        for retreats in range(RETREATS + 1):
+            self._path.hold_rates()
+            error = self._reference.begin(place, rate, target.path, twist)
+            failure = self._improve(place, rate, target)
+            breakdown = min(horizon.breakdown, horizon.damped)
+            is_slower = self._path.retreat(target, breakdown, retreats)
+            # A plan that did not fail is kept; the next step begins slower.
+            if not (is_slower and failure):
+                break
+            target = self._path.again() or target
+        return error, failure
+
+    def _improve(self, place: Array, rate: Array, target: Sampled) -> str:
         """Improve the plan along the reference; return why that failed, or ""."""
         horizon, stages, table = self._horizon, self._stages, self._reference.table
         reference = PathSamples(
@@ -576,8 +418,67 @@ class Replanner:
         )
         jacobian, along = self._reference.jacobian, target.along[stages]
         try:
-            done = horizon.improve(place, rate, jacobian, reference, along)
-            return "" if done else horizon.failure
+            is_improved = horizon.improve(place, rate, jacobian, reference, along)
+            return "" if is_improved else horizon.failure
         # Costs are the user's code: their exceptions must not leave the arm without a command.
         except Exception as error:
             return f"planning failed: {type(error).__name__}: {error}"
+
+    def _flag_of_plan(self, reasons: list[str]) -> Flag:
+        """Return the flag of a plan that was improved, and add what is noticed of it."""
+        if self._path.is_waiting:
+            reasons.append("the tool waits on its path")
+        if self._horizon.elastic:
+            reasons.append("no self-motion keeps all limits over the horizon")
+        if self._clearance is not None and self._clearance.blocked:
+            reasons.append(self._clearance.message)
+            return Flag.STOPPING
+        return Flag.PLANNED
+
+    def _is_stuck(self, passed: float) -> bool:
+        """Return whether the motion breaks down so soon, and for so long, that the arm has to stop.
+
+        Not at once: through a singular pose an arm may continue on its other side.
+        """
+        breakdown = self._horizon.breakdown
+        waited = self._without_motion + max(passed, self.cycle)
+        self._without_motion = waited if breakdown < SOON else 0.0
+        is_delayed = breakdown < AHEAD and not self._as_planned
+        return is_delayed or self._without_motion > self._patience
+
+    def _issue(
+        self, target: Sampled | None, flag: Flag, error: Array, reasons: list[str]
+    ) -> Segment:
+        """Command what is planned, unless its flag is to stop; return the segment, proved.
+
+        Where it is not, the segment before, which is proved, runs to its stop.
+        """
+        commands = self._commands
+        follows, first = False, 0
+        if flag is not Flag.STOPPING:
+            follows = commands.follow(self._kinematics, self._layout, self._table)
+            first = self._cycles
+        delay, notes = self._path.delay, tuple(reasons)
+
+        def braked(cycle: int, share: float) -> Segment:
+            return commands.segment(cycle, flag, notes, follows, error, delay, share)
+
+        segment, failure = self._stop.proved(braked, first)
+        if failure:
+            reasons.append(failure)
+            self._path.refuse(target)
+            flag, follows = Flag.STOPPING, False
+            segment = commands.segment(None, flag, tuple(reasons), follows, error, delay)
+        else:
+            self._path.accept()
+        self._as_planned = follows or flag is Flag.STOPPING
+        self._path.is_held = not follows
+        return segment
+
+
+def _approach_within(approach: Approach, constraints: Sequence[Constraint]) -> Approach:
+    """Return an approach that is no faster than limits of the tool allow."""
+    for item in constraints:
+        if isinstance(item, ToolLimits):
+            approach = approach.within(item.limit)
+    return approach

@@ -4,29 +4,19 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, read_only
-from selfmotion.certificate import Tolerance
-from selfmotion.model.motion import Sampling, Trajectory
-from selfmotion.model.path import Path, Waypoints
+from selfmotion.basics import Array
+from selfmotion.model.path import Path
 from selfmotion.model.task import SE3
-from selfmotion.planning.optimise import Status
-from selfmotion.planning.result import Plan, Report
-from selfmotion.problem.constraints import NO_OVERLAP, Constraint, separate_clearances
-from selfmotion.problem.costs import Cost, JointVelocity, Samples
-from selfmotion.problem.problem import Problem
 from selfmotion.realtime.loop import State, follow
+from selfmotion.realtime.record import Record
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulated_arm import SimulatedArm
-
-# Errors of a measured arm that count as on the path [m, rad].
-_BACK = 1e-3, 1e-2
 
 
 class Scene(Protocol):
@@ -42,126 +32,76 @@ class Scene(Protocol):
         """Return the external displacement of the arm from its command, (n,) [rad or m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
-    """History of a closed loop, a sample per period.
-
-    Attributes
-    ----------
-    t : (K,)
-        Times [s].
-    q : (K, n)
-        Where the arm was [rad or m].
-    targets : tuple of SE3
-        Where its tool should have been.
-    error : (K, 2)
-        How far it was off, in the rows of the task [m, rad].
-    seconds : (K,)
-        How long each step took, by the clock [s].
-    flags : Counter
-        Number of segments by flag.
-    reasons : Counter
-        How often something was noticed.
-    commanded : (M, 3, n)
-        All commands: positions, velocities, accelerations.
-    """
-
-    t: Array
-    q: Array
-    targets: tuple[SE3, ...]
-    error: Array
-    seconds: Array
-    flags: Counter[str]
-    reasons: Counter[str]
-    commanded: Array
-
-    def __post_init__(self) -> None:
-        for name in ("t", "q", "error", "seconds", "commanded"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-    def as_plan(
-        self,
-        replanner: Replanner,
-        costs: Sequence[Cost] = (JointVelocity(),),
-        constraints: Sequence[Constraint] = (),
-    ) -> Plan:
-        """Return the arm's motion as a plan, judged by the certificate, to show and to save.
-
-        Its path is the target's; jumps are linear between two samples.
-        """
-        robot, task = replanner.robot, replanner.task
-        path = Waypoints.from_poses(self.t, list(self.targets))
-        others, apart = separate_clearances(constraints, NO_OVERLAP)
-        problem = Problem(
-            robot, path, task, costs=tuple(costs), constraints=others, clearance=apart
-        )
-        rates = np.gradient(self.q, self.t, axis=0)
-        motion = Trajectory(self.t, self.q, rates, robot.joint_names)
-        samples = Samples.along(problem.follows, Sampling.trapezoidal(self.t), self.q, rates)
-        terms = {cost.name: float(samples.weights @ cost.value(samples)) for cost in costs}
-        steps = len(self.t)
-        report = Report(
-            cost=sum(terms.values()),
-            initial_cost=sum(terms.values()),
-            terms=terms,
-            initial_terms=terms,
-            evaluations=steps,
-            gradient_evaluations=steps,
-            jacobian_evaluations=0,
-            steps=steps - 1,
-            iterations=steps,
-            history=(),
-            status=Status.STOPPED,
-            message="tracked in a closed loop, replanned at each step",
-            seconds=float(self.seconds.sum()),
-        )
-        certificate = problem.certify(motion, Tolerance(*_BACK))
-        return Plan(problem, motion, motion, read_only([]), report, certificate)
-
-
 def track(replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float) -> Record:
     """Simulate the loop of a replanner and an arm for a duration.
 
     Time stops during a step: `Record.seconds` has the steps' durations.
-    """
-    robot, task = replanner.robot, replanner.task
-    times: list[float] = []
-    places, targets, errors, took = [], [], [], []
-    flags: Counter[str] = Counter()
-    reasons: Counter[str] = Counter()
-    began = 0.0
 
-    def read() -> State | None:
-        nonlocal began
-        t = arm.t
-        if t > seconds - 0.5 * replanner.period:
+    Parameters
+    ----------
+    replanner : Replanner
+    arm : SimulatedArm
+    scene : Scene
+        Path, obstacles and pushes.
+    seconds : float
+        Duration in the arm's time [s].
+    """
+    recorder = _Recorder(replanner, arm, scene, seconds)
+    follow(replanner, recorder.read, recorder.write)
+    return recorder.record()
+
+
+class _Recorder:
+    """Reads and commands a simulated arm, and records both."""
+
+    def __init__(
+        self, replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float
+    ) -> None:
+        self._replanner, self._arm, self._scene = replanner, arm, scene
+        self._last_time = seconds - 0.5 * replanner.period
+        self._times: list[float] = []
+        self._positions: list[Array] = []
+        self._targets: list[SE3] = []
+        self._errors: list[tuple[float, float]] = []
+        self._durations: list[float] = []
+        self._flags: Counter[str] = Counter()
+        self._reasons: Counter[str] = Counter()
+        # When the present step began, by the clock.
+        self._step_began = 0.0
+
+    def read(self) -> State | None:
+        """Return the measured state of the arm; None at the end."""
+        arm, scene, replanner, t = self._arm, self._scene, self._replanner, self._arm.t
+        if t > self._last_time:
             return None
         arm.pushed = scene.pushed(t)
         path = scene.path(t)
         target = path.pose(min(t, path.duration))
-        times.append(t)
-        places.append(arm.q.copy())
-        targets.append(target)
-        errors.append(task.miss(target, robot.pose(arm.q)))
+        self._times.append(t)
+        self._positions.append(arm.q.copy())
+        self._targets.append(target)
+        self._errors.append(replanner.task.miss(target, replanner.robot.pose(arm.q)))
         state = State(t, *arm.measure(), path, scene.obstacles(t))
-        began = time.perf_counter()
+        self._step_began = time.perf_counter()
         return state
 
-    def write(segment: Segment) -> None:
-        took.append(time.perf_counter() - began)
-        flags[segment.flag.value] += 1
-        reasons.update(reason.split(":")[0] for reason in segment.reasons)
-        arm.write(segment)
-        arm.run(replanner.period)
+    def write(self, segment: Segment) -> None:
+        """Command a segment, and let a period pass."""
+        self._durations.append(time.perf_counter() - self._step_began)
+        self._flags[segment.flag.value] += 1
+        self._reasons.update(reason.split(":")[0] for reason in segment.reasons)
+        self._arm.write(segment)
+        self._arm.run(self._replanner.period)
 
-    follow(replanner, read, write)
-    return Record(
-        np.array(times),
-        np.array(places),
-        tuple(targets),
-        np.array(errors),
-        np.array(took),
-        flags,
-        reasons,
-        np.array(arm.commanded),
-    )
+    def record(self) -> Record:
+        """Return what was recorded."""
+        return Record(
+            np.array(self._times),
+            np.array(self._positions),
+            tuple(self._targets),
+            np.array(self._errors),
+            np.array(self._durations),
+            self._flags,
+            self._reasons,
+            np.array(self._arm.commanded),
+        )

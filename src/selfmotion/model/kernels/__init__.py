@@ -42,7 +42,7 @@ from selfmotion.model.kernels.stages import (
     sensitivities as sensitivities,
     space_size as space_size,
 )
-from selfmotion.model.kernels.start import approach as approach
+from selfmotion.model.kernels.start import start_step as start_step
 from selfmotion.model.kernels.table import (
     Stage as Stage,
     Tip as Tip,

@@ -1,4 +1,4 @@
-"""One step of Newton's method towards a start on the self-motion of the first pose."""
+"""One step of Newton's method towards a start: the pose and coordinates on its self-motion."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from selfmotion.model.kernels.tool import errors_and_rows, rows_of
 
 
 @inlined
-def approach(
+def start_step(
     q: Array,
     jacobians: Array,
     rotations: Array,
@@ -25,19 +25,45 @@ def approach(
 ) -> float:
     """Add B⁻¹b to q (n,), with B = [J; N0ᵀ] and b = [e; z - N0ᵀ(q - q_ref)]; return max |b|.
 
-    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3), and their targets' translations and rotations,
-    (12 F,). B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is
-    singular, NaN where q is not finite. Sets `system` (m + r, n) to B and `factor`, square, to the
-    Cholesky factor of BBᵀ; `b` (m + r,) is to work in.
+    The start q has the pose of the target, e = 0, and the coordinates z on its self-motion. The
+    step is computed as Bᵀ(BBᵀ)⁻¹b: errors of the product are taken out by the next one.
+
+    Parameters
+    ----------
+    q : (n,)
+        Configuration; becomes the next iterate.
+    jacobians, rotations, translations : (F, 6, n), (F, 3, 3), (F, 3)
+        Of all tips, at q.
+    target : (12 F,)
+        Where the tips have to be; as in `Follows.targets`.
+    layout : Layout
+        Prescribed rows of all tips, m in all.
+    null : (n, r)
+        N0, a basis of the self-motion at the reference.
+    reference : (n,)
+        q_ref, from which z is measured.
+    z : (r,)
+        Coordinates on the self-motion.
+    b : (m + r,)
+        Set to (BBᵀ)⁻¹b.
+    system : (m + r, n)
+        Set to B.
+    factor : (m + r, m + r)
+        Set to the Cholesky factor of BBᵀ.
+
+    Returns
+    -------
+    float
+        max |b| before the step; -1 where B is singular, NaN where q is not finite: then q stays.
     """
     m, r, n = rows_of(layout), null.shape[1], q.shape[0]
     errors_and_rows(layout, target, jacobians, rotations, translations, b, system)
     for i in range(r):
-        total = z[i]
+        coordinate_error = z[i]
         for k in range(n):
             system[m + i, k] = null[k, i]
-            total -= null[k, i] * (q[k] - reference[k])
-        b[m + i] = total
+            coordinate_error -= null[k, i] * (q[k] - reference[k])
+        b[m + i] = coordinate_error
     largest = 0.0
     for i in range(m + r):
         # Written so that NaN stays.
@@ -48,8 +74,8 @@ def approach(
         return -1.0 if largest < np.inf else np.nan
     solve_cholesky(factor, b)
     for k in range(n):
-        total = q[k]
+        q_next = q[k]
         for i in range(m + r):
-            total += system[i, k] * b[i]
-        q[k] = total
+            q_next += system[i, k] * b[i]
+        q[k] = q_next
     return largest

@@ -23,7 +23,6 @@ from selfmotion.model.kernels import (
     add_angular,
     angular,
     angular_part,
-    approach,
     cholesky,
     clear_held,
     cross,
@@ -37,6 +36,7 @@ from selfmotion.model.kernels import (
     select,
     solve_cholesky,
     stage_of,
+    start_step,
     tip_of,
     view,
 )
@@ -92,7 +92,7 @@ def retract(
         for _ in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
             clear_held(held[k], jacobians)
-            off = approach(
+            off = start_step(
                 here,
                 jacobians,
                 rotations,

@@ -29,7 +29,7 @@ from selfmotion.planning.planner.first_motions import (
 from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.outcomes import ARRIVED, NodeOutcome, is_kept, rank_of
 from selfmotion.planning.planner.recorder import Recorder
-from selfmotion.planning.search import BESIDE
+from selfmotion.planning.search import TIME_SHIFT
 
 # Additional nodes next to rests, as shares of the first and last interval, where no motion is
 # feasible: limits little above the mean speed leave little time to start and stop.
@@ -94,7 +94,7 @@ class LocalSearch:
         """
         # Beside a singular pose the path may be out of reach, by next to nothing.
         beside = t.copy()
-        beside[1:-1] += BESIDE * np.diff(t)[1:]
+        beside[1:-1] += TIME_SHIFT * np.diff(t)[1:]
         for times in (t, beside):
             grid = self.grid(times)
             near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]

@@ -31,7 +31,7 @@ from selfmotion.planning.nodes import (
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.grids import UNKEPT
 from selfmotion.planning.rollout import MinimumNormMotion
-from selfmotion.planning.search import BESIDE
+from selfmotion.planning.search import TIME_SHIFT
 from selfmotion.problem.constraints import (
     ActiveConstraint,
     Multipliers,
@@ -334,7 +334,7 @@ class NodeOutcome:
         Beside a singular pose the path may be so, by next to nothing: a little later it is not.
         """
         beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
-        beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
+        beside[new] += TIME_SHIFT * np.diff(t, append=t[-1])[new]
         smoothed, quick = may_be_smoothed(self.motion), quickness_of(self.motion)
         for times in (t, beside):
             motion = on_grid(

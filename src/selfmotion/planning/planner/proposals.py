@@ -43,11 +43,11 @@ from selfmotion.planning.search import (
     Sequence,
     SinglePoses,
     Stacked,
-    asks_length,
     carried,
     carried_within,
     guides,
     inside,
+    is_joint_travel,
     metrics,
     pushed,
     shortest_along,
@@ -339,7 +339,7 @@ def along_chain(guess: Guess, guide: Sequence) -> NodeOutcome | None:
     its optimum already, so that only velocities are missing.
     """
     formulation, effort, conditions = guess.formulation, guess.effort, guess.conditions
-    if not is_on_nodes(formulation, effort) or not asks_length(formulation):
+    if not is_on_nodes(formulation, effort) or not is_joint_travel(formulation):
         return None
     if conditions.ends:
         # The search's sequences know nothing of given ends.

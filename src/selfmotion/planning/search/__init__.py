@@ -1,25 +1,25 @@
 """Initial guesses: start configurations, self-motion curves, chains over them, reachability."""
 
+from selfmotion.planning.search.chain_shortening import (
+    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
+    TIME_SHIFT as TIME_SHIFT,
+    shortest_along as shortest_along,
+)
 from selfmotion.planning.search.chains import Sequence as Sequence
 from selfmotion.planning.search.curves import (
     SPACING as SPACING,
     SelfMotion as SelfMotion,
 )
-from selfmotion.planning.search.guides import (
-    BESIDE as BESIDE,
-    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
-    asks_length as asks_length,
-    guides as guides,
-    has_curves as has_curves,
-    shortest_along as shortest_along,
-)
+from selfmotion.planning.search.guides import guides as guides
 from selfmotion.planning.search.manifold import Manifold as Manifold
+from selfmotion.planning.search.measures import is_joint_travel as is_joint_travel
 from selfmotion.planning.search.obstruction import (
     Obstruction as Obstruction,
     Reach as Reach,
     obstruction as obstruction,
     reachable as reachable,
 )
+from selfmotion.planning.search.search_times import has_curves as has_curves
 from selfmotion.planning.search.segments import (
     ChainSegment as ChainSegment,
     ChainSegments as ChainSegments,

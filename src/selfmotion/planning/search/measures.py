@@ -268,3 +268,19 @@ def measure_of(formulation: Formulation, t: Array, weights: Array) -> Measure:
     if is_travel or not (running_cost.static_costs or running_cost.kinetic_costs):
         return JointTravel(weights)
     return running_cost
+
+
+def is_joint_travel(formulation: Formulation) -> bool:
+    """Whether chains are measured by their joint travel."""
+    t = np.array([0.0, formulation.path.duration])
+    return isinstance(measure_of(formulation, t, joint_weights(formulation)), JointTravel)
+
+
+def joint_weights(formulation: Formulation) -> Array:
+    """Return the weight of each joint's unit, (n,): that of the path's length, if it is a cost."""
+    coordinates = formulation.coordinates
+    virtual = coordinates.weights[formulation.robot.dof :]
+    for cost in formulation.costs:
+        if isinstance(cost, PathLength) and cost.joint_weights is not None:
+            return np.append(np.asarray(cost.joint_weights, dtype=np.float64), virtual)
+    return coordinates.weights

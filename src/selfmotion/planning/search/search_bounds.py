@@ -1,5 +1,6 @@
 """Bounds of the search: which configurations may be vertices, and at which turns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from selfmotion.model.collision import CollisionModel
 
 # Distance at which a joint is at its limit [rad or m].
 AT_LIMIT = 1e-3
+# Clearance of sequences in addition to the required one [m]: they are checked at waypoints only.
+_CLEARANCE_MARGIN = 2.5e-4
 # A whole turn [rad].
 _TURN = 2.0 * np.pi
 
@@ -121,3 +124,10 @@ class SearchBounds:
                 turns.append(more[more[:, k] <= self.upper[k]])
             q = np.concatenate(turns)
         return q
+
+
+def with_clearance_margin(
+    bodies: Sequence[tuple[CollisionModel, float]],
+) -> tuple[tuple[CollisionModel, float], ...]:
+    """Return bodies with a minimum distance that leaves room between waypoints [m]."""
+    return tuple((model, distance + _CLEARANCE_MARGIN) for model, distance in bodies)

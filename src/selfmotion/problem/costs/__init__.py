@@ -12,11 +12,7 @@ from selfmotion.problem.costs.dynamics import (
     GravityTorque as GravityTorque,
     KineticEnergy as KineticEnergy,
 )
-from selfmotion.problem.costs.function import (
-    FunctionCost as FunctionCost,
-    LostCost as LostCost,
-    cost_from_dict as cost_from_dict,
-)
+from selfmotion.problem.costs.function import FunctionCost as FunctionCost
 from selfmotion.problem.costs.joints import (
     JointAcceleration as JointAcceleration,
     JointJerk as JointJerk,
@@ -26,6 +22,7 @@ from selfmotion.problem.costs.joints import (
     Posture as Posture,
     metres_of as metres_of,
 )
+from selfmotion.problem.costs.lost import LostCost as LostCost, cost_from_dict as cost_from_dict
 from selfmotion.problem.costs.manipulability import (
     DirectionalManipulability as DirectionalManipulability,
     InverseManipulability as InverseManipulability,

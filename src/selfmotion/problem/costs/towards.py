@@ -64,13 +64,13 @@ class Towards(Cost):
 
     @override
     def gradient(self, samples: Samples) -> Partials:
-        """W (c - c*) ∂c/∂q."""
+        """Return w (c - c*) ∂c/∂q."""
         values, by_q = self.coordinate(self.robot, samples.q)
         return Partials(q=(self.weight * self.coordinate.away(values, self.target))[:, None] * by_q)
 
     @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """In the middle of the joint limits."""
+        """Return w ∂c/∂q ∂c/∂qᵀ in the middle of the joint limits."""
         lower, upper = self.robot.finite_limits()
         _, by_q = self.coordinate(self.robot, 0.5 * (lower + upper)[None])
         return {0: self.weight * np.outer(by_q[0], by_q[0])}

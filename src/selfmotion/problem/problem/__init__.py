@@ -5,7 +5,13 @@ from selfmotion.problem.problem.calibrated import (
     off_nominal as off_nominal,
     start_on_path as start_on_path,
 )
+from selfmotion.problem.problem.defaults import (
+    KEPT as KEPT,
+    OF_MAKER as OF_MAKER,
+    USUAL_COSTS as USUAL_COSTS,
+)
 from selfmotion.problem.problem.digest import conditions_digest as conditions_digest
+from selfmotion.problem.problem.end_checks import START_TOLERANCE as START_TOLERANCE
 from selfmotion.problem.problem.end_constraints import (
     at_all_times as at_all_times,
     check_all_times as check_all_times,
@@ -17,13 +23,7 @@ from selfmotion.problem.problem.envelopes import (
     envelope_of_problem as envelope_of_problem,
     envelope_without_arm as envelope_without_arm,
 )
-from selfmotion.problem.problem.fit import (
-    KEPT as KEPT,
-    OF_MAKER as OF_MAKER,
-    START_TOLERANCE as START_TOLERANCE,
-    USUAL_COSTS as USUAL_COSTS,
-    check_feeds as check_feeds,
-)
+from selfmotion.problem.problem.feed_checks import check_feeds as check_feeds
 from selfmotion.problem.problem.knots import smooth_knots as smooth_knots
 from selfmotion.problem.problem.paper_problem import sample_problem as sample_problem
 from selfmotion.problem.problem.problem import (

@@ -8,7 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Certificate, Requirement, Separation
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
-from selfmotion.problem.problem.fit import START_TOLERANCE
+from selfmotion.problem.problem.end_checks import START_TOLERANCE
 
 
 def too_near_at(

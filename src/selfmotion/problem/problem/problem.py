@@ -43,24 +43,21 @@ from selfmotion.problem.constraints import (
     separate_clearances,
 )
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
+from selfmotion.problem.problem.defaults import ANY_NULL_MOTION, KEPT, USUAL_COSTS
 from selfmotion.problem.problem.digest import conditions_digest
+from selfmotion.problem.problem.end_checks import check_end, check_start
 from selfmotion.problem.problem.end_constraints import prescribed_end
 from selfmotion.problem.problem.envelopes import envelope_of_problem, envelope_without_arm
-from selfmotion.problem.problem.fit import (
-    ANY_NULL_MOTION,
-    KEPT,
-    SEQUENCES,
-    USUAL_COSTS,
-    check_costs,
-    check_end,
-    check_feeds,
-    check_fit,
-    check_judged,
-    check_kinds,
-    check_start,
-    first_tool,
-)
+from selfmotion.problem.problem.feed_checks import check_feeds
+from selfmotion.problem.problem.first_follow import first_follow
+from selfmotion.problem.problem.fit import check_fit
 from selfmotion.problem.problem.of_start import misses_of_start, too_near_at
+from selfmotion.problem.problem.parameter_checks import (
+    SEQUENCES,
+    check_costs,
+    check_kinds,
+    check_requirements,
+)
 from selfmotion.problem.problem.remarks import remarks_on
 from selfmotion.problem.problem.rest import arm_rest_orders
 
@@ -156,7 +153,7 @@ class Problem:
     def __post_init__(self) -> None:
         if isinstance(self.path, list | tuple):
             several = as_several(self.path, "path", Follow)
-            first, robot = first_tool(several, self.robot)
+            first, robot = first_follow(several, self.robot)
             object.__setattr__(self, "robot", robot)
             object.__setattr__(self, "path", first.path)
             object.__setattr__(self, "task", first.task)
@@ -186,7 +183,7 @@ class Problem:
             if end is not None:
                 check_end(self.follows, end, self.relaxations)
         # Now, not when the motion is finished: without a requirement nothing judges it.
-        check_judged(self.all_constraints, self._judging)
+        check_requirements(self.all_constraints, self._judging)
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)

@@ -12,7 +12,7 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.path import TURN_NOTE, spread_along
 from selfmotion.model.robot import RobotModel, mounting_of
 from selfmotion.problem.constraints import Constraint, Envelope
-from selfmotion.problem.problem.fit import KEPT
+from selfmotion.problem.problem.defaults import KEPT
 
 # Samples of a path.
 _SAMPLES = 101

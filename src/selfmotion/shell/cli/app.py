@@ -27,7 +27,7 @@ import selfmotion as sm
 from selfmotion.basics import seconds_waited_for_kernels, version
 from selfmotion.planning.optimise import Iteration
 from selfmotion.shell.cli import tables
-from selfmotion.shell.cli.moved import moved
+from selfmotion.shell.cli.moved import replacement
 from selfmotion.shell.cli.option_names import in_shell
 
 if TYPE_CHECKING:
@@ -286,7 +286,7 @@ def main() -> None:
     as well, see `error_json`.
     """
     as_json = "--json" in sys.argv[1:]
-    instead = moved(sys.argv[1:])
+    instead = replacement(sys.argv[1:])
     if instead:
         _fail(sm.errors.ProblemError(instead), instead, as_json)
         sys.exit(BAD_INPUT)

@@ -108,7 +108,7 @@ def left_to_controller(program: controllers.ControllerProgram | None) -> dict[st
 
 def print_controller_note(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
-    if program is not None and program.within is not None:
+    if program is not None and program.feed_tolerance is not None:
         terminal.print(controllers.unjudged_note(program), markup=False, soft_wrap=True)
 
 

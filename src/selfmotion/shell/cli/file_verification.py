@@ -108,8 +108,8 @@ def _verify_program(planned: Planned, target: Path) -> FileVerdict:
     targets = f"{count} {'target' if count == 1 else 'targets'}"
     if deviations:
         targets += f", between which the tool is at most {', and '.join(deviations)}"
-    remarks = [f"a seam has times all the same: {reason}" for reason in program.timed]
-    if program.within is not None:
+    remarks = [f"a seam has times all the same: {reason}" for reason in program.timed_reasons]
+    if program.feed_tolerance is not None:
         remarks.insert(0, "seams are at their feeds, with ramps of the controller's own")
     if program.remark:
         remarks.append(f"they are joints, as poses do not keep the motion: {program.remark}")

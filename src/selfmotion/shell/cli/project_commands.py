@@ -95,13 +95,14 @@ def study(
 def warm_up() -> None:
     """Compile all numerical kernels now, once per machine, so that no plan waits for them."""
     began = time.perf_counter()
-    counter, other = CompilationCounter(), compile_in_background(ALL_WORKS)
+    counter = CompilationCounter()
+    background = compile_in_background(ALL_WORKS)
     with event.install_listener("numba:compile", counter), StageDisplay(stages) as display:
         works = list(small_works())
         for number, (name, work) in enumerate(works):
             display.stage(f"kernels for {name}", number + 1, len(works))
             work()
-    count = counter.count + (0 if other is None else int(other.communicate()[0] or 0))
+    count = counter.count + (0 if background is None else int(background.communicate()[0] or 0))
     seconds = time.perf_counter() - began
     outcome = "nothing was left to compile" if not count else f"{count} kernels"
     terminal.print(f"{outcome}, {seconds:.0f} s", markup=False)

@@ -15,6 +15,7 @@ from selfmotion.model.task import Task
 from selfmotion.problem.constraints import NO_OVERLAP, as_clearances, separate_clearances
 from selfmotion.problem.problem import KEPT
 from selfmotion.shell.documents.body_tables import CarriedBody, WorkpieceTable
+from selfmotion.shell.documents.field_checks import of_kind
 from selfmotion.shell.documents.field_types import (
     Checked,
     Flag,
@@ -26,7 +27,6 @@ from selfmotion.shell.documents.field_types import (
     Whole,
     key,
     needed,
-    of_kind,
 )
 from selfmotion.shell.documents.one_of import Either
 from selfmotion.shell.documents.path_base import Events, after

@@ -12,7 +12,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.shop.cam.cuts import Cut
-from selfmotion.shop.cam.drawn_curves import DRAWN
+from selfmotion.shop.cam.drawn_curves import ENTITY_TYPES, entity_points
 from selfmotion.shop.cam.pose_rows import LENGTH_UNITS, PoseRows, no_such_seam
 
 # Names of entities and attributes: https://ezdxf.mozman.at/docs/.
@@ -238,17 +238,15 @@ def _chords_of(
     """Yield an entity as a chain of chords, unless it is shorter than the gap tolerance."""
     from ezdxf.lldxf.const import DXFError
 
-    draw = DRAWN.get(entity.dxftype())
-    if draw is None:
+    if entity.dxftype() not in ENTITY_TYPES:
         raise FileFormatError(
-            f"{file}: layer '{layer}': {label} is not read, expected {', '.join(DRAWN)} or blocks "
-            f"of them; explode it in CAD, delete it, switch its layer off, or choose the seam of "
-            f"another layer"
+            f"{file}: layer '{layer}': {label} is not read, expected {', '.join(ENTITY_TYPES)} or "
+            f"blocks of them; explode it in CAD, delete it, switch its layer off, or choose the "
+            f"seam of another layer"
         )
     try:
-        points = unit * np.array(draw(entity, _CHORD_TOLERANCE / unit), dtype=np.float64).reshape(
-            -1, 3
-        )
+        drawn = np.array(entity_points(entity, _CHORD_TOLERANCE / unit), dtype=np.float64)
+        points = unit * drawn.reshape(-1, 3)
     except (DXFError, *_CORRUPT) as error:
         raise FileFormatError(
             f"{file}: layer '{layer}': {label} cannot be drawn: {_one_line(error)}; "

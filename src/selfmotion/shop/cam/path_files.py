@@ -22,6 +22,7 @@ from selfmotion.shop.cam.drawing import read_drawing
 from selfmotion.shop.cam.gcode import read_gcode
 from selfmotion.shop.cam.path_building import JUMP, Pacing, path_of_rows
 from selfmotion.shop.cam.peers import peer_table
+from selfmotion.shop.cam.pose_arrays import read_array
 from selfmotion.shop.cam.pose_lists import read_poses
 from selfmotion.shop.cam.pose_rows import (
     ARRAY,
@@ -34,7 +35,7 @@ from selfmotion.shop.cam.pose_rows import (
     Reading,
     no_such_seam,
 )
-from selfmotion.shop.cam.pose_tables import read_array, read_tables
+from selfmotion.shop.cam.pose_tables import read_tables
 
 
 def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:

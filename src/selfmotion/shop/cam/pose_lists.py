@@ -13,8 +13,9 @@ import numpy as np
 from selfmotion.basics import FileFormatError, is_number, read_values, shown
 from selfmotion.shop.cam.column_names import column_name
 from selfmotion.shop.cam.peers import compas_poses
+from selfmotion.shop.cam.pose_arrays import MATRIX_NOTE
+from selfmotion.shop.cam.pose_columns import rows_of_table
 from selfmotion.shop.cam.pose_rows import PoseRows
-from selfmotion.shop.cam.pose_tables import MATRIX_NOTE, rows_of_table
 from selfmotion.shop.cam.ros_messages import poses_of_messages
 
 # Names of lists of poses.

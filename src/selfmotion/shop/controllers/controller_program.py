@@ -6,21 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.task import SE3
-from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers.controller_axes import Axis
-from selfmotion.shop.controllers.deviations import NO_DEVIATION, Deviations, deviation_of
+from selfmotion.shop.controllers.deviations import Deviations
 from selfmotion.shop.controllers.feed_segments import FeedSegment
-from selfmotion.shop.controllers.operations import operations_of
-from selfmotion.shop.controllers.pose_numbers import TIME_TOLERANCE
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
 from selfmotion.shop.controllers.segments import Knots, Segment, by_interpolation
 from selfmotion.shop.controllers.work_objects import WORLD
-from selfmotion.work.job import Program
 
 # Largest distance of a first pose that was taught anew from the axis target before [rad or m].
 _MAX_START_GAP = 0.02
@@ -66,9 +61,9 @@ class ControllerProgram:
         The link that the work object is fixed to, or ``"world"``.
     remark : str
         Why targets are joints in place of poses.
-    within : Tolerance or None
+    feed_tolerance : Tolerance or None
         Path tolerance that is certified for seams with a programmed feed; None if there are none.
-    timed : tuple of str
+    timed_reasons : tuple of str
         Why seams with a feed are programmed with times, each reason once.
     start_gap : float
         Joint distance of the slow move from the initial axis target to the first pose [rad or m].
@@ -86,8 +81,8 @@ class ControllerProgram:
     shift: SE3 | None = None
     carrier: str = WORLD
     remark: str = ""
-    within: Tolerance | None = None
-    timed: tuple[str, ...] = ()
+    feed_tolerance: Tolerance | None = None
+    timed_reasons: tuple[str, ...] = ()
     start_gap: float = 0.0
     facts: ProgramFacts | None = None
     load: Load | None = None
@@ -99,7 +94,7 @@ class ControllerProgram:
 
     @property
     def start_fault(self) -> str:
-        """Why the initial axis target does not fit the first pose; empty for none.
+        """Why the first axis target does not fit the first pose; "" where it does.
 
         With a shifted work object, a move to the shifted start is expected.
         """
@@ -112,14 +107,14 @@ class ControllerProgram:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion as the cubic spline through the targets of each segment, at rest in between.
+        """The motion as a cubic spline through the targets of each segment, at rest in between.
 
         Raises
         ------
         FileFormatError
             There is none.
         """
-        return self._motion([next(motions) for motions in self._segment_motions(None)])
+        return self._joined([next(motions) for motions in self._segment_motions(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
         """Return the motions of a controller, one for each interpolation between targets.
@@ -130,78 +125,29 @@ class ControllerProgram:
         Raises
         ------
         FileFormatError
-            There is none, or a speed is another one than the path has.
+            There is none, or a speed is not that of the path.
         """
-        return [
-            self._motion(segments) for segments in by_interpolation(self._segment_motions(path))
-        ]
+        segments_by_interpolation = by_interpolation(self._segment_motions(path))
+        return [self._joined(segments) for segments in segments_by_interpolation]
 
     def _segment_motions(self, path: Path | None) -> Iterator[Iterator[Knots]]:
         """Yield the motions of each segment, one for each interpolation."""
-        begin = 0.0
+        elapsed = 0.0
         for segment in self.segments:
             if path is not None and isinstance(segment, FeedSegment):
-                yield segment.along(path, begin)
+                yield segment.along(path, elapsed)
             elif segment.is_rest:
                 yield iter([Knots(segment.t, segment.q, 0.0 * segment.q)])
             else:
                 yield segment.motions()
-            begin += segment.duration
+            elapsed += segment.duration
 
-    def _motion(self, segments: Sequence[Knots]) -> Trajectory:
-        """Return the motions of all segments, one after the other."""
+    def _joined(self, segments: Sequence[Knots]) -> Trajectory:
+        """Return the motions of all segments as one, one after the other."""
         t, q, qd = [np.zeros(1)], [segments[0].q[:1]], [0.0 * segments[0].q[:1]]
-        for times, places, rates in segments:
-            t.append(t[-1][-1] + times[1:])
-            q.append(places[1:])
-            qd.append(rates[1:])
+        for segment in segments:
+            t.append(t[-1][-1] + segment.t[1:])
+            q.append(segment.q[1:])
+            qd.append(segment.qd[1:])
         names = tuple(axis.joint for axis in self.axes)
         return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
-
-    def deviation_of(self, plan: Plan | Parts | Move | Program) -> Deviations:
-        """Return the deviation from the motion of a plan, parts, a move or a program.
-
-        Raises
-        ------
-        FileFormatError
-            It has other joints, or other segments.
-        """
-        operations = operations_of(plan)
-        names = [axis.joint for axis in self.axes]
-        joint_names = plan.robot.joint_names
-        if sorted(names) != sorted(joint_names):
-            raise FileFormatError(
-                f"has joints {', '.join(names)}, expected {', '.join(joint_names)}"
-            )
-        order = [names.index(name) for name in joint_names]
-        worst = Deviations(NO_DEVIATION, NO_DEVIATION)
-        # Time within the present operation, and its index.
-        elapsed, k = 0.0, 0
-        for number, segment in enumerate(self.segments):
-            if segment.is_slow and self.shift is None:
-                after = self.segments[min(number + 1, len(self.segments) - 1)].name
-                raise FileFormatError(
-                    f"the arm is not where '{after}' begins, by the poses before: it is singular "
-                    f"there"
-                )
-            same = segment.in_order(order)
-            operation = operations[min(k, len(operations) - 1)]
-            deviation = deviation_of(
-                same, operation.motion, operation.chains, operation.motion.t[0] + elapsed
-            )
-            both = (
-                Deviations(NO_DEVIATION, deviation)
-                if operation.is_move
-                else Deviations(deviation, NO_DEVIATION)
-            )
-            worst = worst.worse(both)
-            elapsed += segment.duration
-            if elapsed >= operation.motion.duration - TIME_TOLERANCE:
-                elapsed, k = 0.0, k + 1
-        if k > len(operations):
-            raise FileFormatError("goes on when the motion has ended")
-        if k < len(operations):
-            raise FileFormatError(
-                f"ends {len(operations) - k} seams or moves before the motion does"
-            )
-        return worst

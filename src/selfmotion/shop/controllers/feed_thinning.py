@@ -15,9 +15,10 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.arc_length import ArcLength
 from selfmotion.shop.controllers.arcs import arc_through, step_lengths
 from selfmotion.shop.controllers.deviations import SAMPLING_FACTOR, Deviation
-from selfmotion.shop.controllers.feed_segments import ArcLength, FeedSegment, times_at
+from selfmotion.shop.controllers.feed_segments import FeedSegment, nominal_target_times
 from selfmotion.shop.controllers.operations import Operation
 from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.pose_segments import aligned_quaternions
@@ -78,7 +79,7 @@ class FeedSection(PoseSection):
         travel = [part._travel for part in parts]
         why, stuck = "there is no feed where the tool hardly moves", None
         for free, share in product(_FREE_TOLERANCES, _POSITION_SHARES):
-            if min(each.whole for each in travel) < _MIN_LENGTH:
+            if min(each.total for each in travel) < _MIN_LENGTH:
                 break
             nearer = replace(allowed, position=share * allowed.position)
             turning = max(free, allowed.rotation)
@@ -203,24 +204,24 @@ class FeedSection(PoseSection):
 
     def _time_at(self, travel: ArcLength, far: float) -> float:
         """Return the time at which the tool has travelled an arc length [s]."""
-        return float(np.clip(travel.when(np.array([far]))[0], self.first, self.last))
+        return float(np.clip(travel.times_at(np.array([far]))[0], self.first, self.last))
 
     def _fixed_lengths(self, travel: ArcLength) -> Array:
         """Return the arc lengths of ends, events and changes of the feed [m]."""
         start = float(self.operation.motion.t[0])
         changes = [start + item.during.ravel() for item in self.operation.feeds[0]]
         times = np.concatenate([[at for at, _ in self.events], *changes])
-        inside = np.unique(travel.at(times[(times > self.first) & (times < self.last)]))
-        inside = inside[(inside > _MIN_STEP) & (inside < travel.whole - _MIN_STEP)]
+        inside = np.unique(travel.lengths_at(times[(times > self.first) & (times < self.last)]))
+        inside = inside[(inside > _MIN_STEP) & (inside < travel.total - _MIN_STEP)]
         inside = inside[np.append(True, np.diff(inside) > _MIN_STEP)[: len(inside)]]
-        return np.concatenate([[0.0], inside, [travel.whole]])
+        return np.concatenate([[0.0], inside, [travel.total]])
 
     def _sampled(self, travel: ArcLength, fixed: Array) -> SampledPoses:
         motion = self.operation.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         inside = inside[:: max(1, len(inside) // (_MAX_SAMPLES - _MIN_SAMPLES))]
-        even = np.linspace(0.0, travel.whole, _MIN_SAMPLES + 1)
-        others = np.unique(np.concatenate([even, travel.at(inside)]))
+        even = np.linspace(0.0, travel.total, _MIN_SAMPLES + 1)
+        others = np.unique(np.concatenate([even, travel.lengths_at(inside)]))
         others = others[np.append(True, np.diff(others) > _MIN_STEP)]
         apart = np.abs(others[:, None] - fixed).min(axis=1) > _MIN_STEP
         far = np.sort(np.concatenate([fixed, others[apart]]))
@@ -236,7 +237,7 @@ class FeedSection(PoseSection):
 
     def _configurations_at(self, travel: ArcLength, far: Array) -> Array:
         """Return the configurations at arc lengths, (K, n)."""
-        return self.operation.motion(np.minimum(travel.when(far), self.last))
+        return self.operation.motion(np.minimum(travel.times_at(far), self.last))
 
     def _segment(self, travel: ArcLength, along: SampledPoses, steps: Steps) -> FeedSegment:
         """Return the segment of targets, rounded to the digits of the file."""
@@ -255,18 +256,20 @@ class FeedSection(PoseSection):
             positions, quaternions, self._mixed(along.q[ends], q)
         )
         if not arrived.all():
-            at = travel.when(along.travel[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
+            at = travel.times_at(along.travel[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
             raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
         speeds = self._speeds(travel, along.travel[ends])
-        times = times_at(positions, vias, speeds)
+        times = nominal_target_times(positions, vias, speeds)
         far = np.append(0.0, np.cumsum(step_lengths(positions, vias)))
 
         def near(step_times: Array) -> Array:
             share = np.interp(step_times, times, far) / far[-1]
-            return self._configurations_at(travel, share * travel.whole)
+            return self._configurations_at(travel, share * travel.total)
 
         events = [
-            Event(int(np.abs(along.travel[ends] - travel.at(np.array([at]))).argmin()), name)
+            Event(
+                int(np.abs(along.travel[ends] - travel.lengths_at(np.array([at]))).argmin()), name
+            )
             for at, name in self.events
         ]
         return FeedSegment(
@@ -286,9 +289,9 @@ class FeedSection(PoseSection):
 
     def _speeds(self, travel: ArcLength, ends: Array) -> Array:
         """Return the feed of each step; for leads the speed that takes their duration [m/s]."""
-        middles = travel.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
+        middles = travel.times_at(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
         speeds = np.full(
-            len(middles), travel.whole / ((1.0 - _RAMP_SHARE) * (self.last - self.first))
+            len(middles), travel.total / ((1.0 - _RAMP_SHARE) * (self.last - self.first))
         )
         for item in self.operation.feeds[0]:
             for begin, end in item.during:

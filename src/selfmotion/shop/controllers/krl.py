@@ -1,16 +1,17 @@
 """KUKA Robot Language: spline blocks of targets with times, or of poses at speeds."""
 
-from collections.abc import Mapping
-
-import numpy as np
-
-from selfmotion.basics import Array
-from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS, krl_numbers, krl_pose
+from selfmotion.shop.controllers.krl_aggregates import (
+    AXES_PATTERN,
+    POSE_PATTERN,
+    read_axes,
+    read_frame,
+    read_pose,
+    write_axes,
+    write_frame,
+    write_pose,
+)
+from selfmotion.shop.controllers.pose_numbers import TIME_DIGITS
 from selfmotion.shop.controllers.program_reader import ProgramReader
-from selfmotion.shop.controllers.program_settings import AXES
-from selfmotion.shop.controllers.program_writer import WrittenPose
-from selfmotion.shop.controllers.segment_building import Pose, pose_of_values
 from selfmotion.shop.controllers.statements import (
     NUMBER,
     Field,
@@ -36,74 +37,19 @@ from selfmotion.shop.controllers.statements import (
 # orientation turns evenly in ``$BASE`` (``$ORI_TYPE = #VAR``, ``$CIRC_TYPE = #BASE``).
 
 # Largest number of characters in a name.
-NAME = 24
+MAX_NAME_LENGTH = 24
 # Largest speed of the approach [m/s].
-FASTEST = 0.5
+APPROACH_SPEED = 0.5
 # Largest rate of turning of the approach [°/s].
-TURNING = 100.0
-# Rate of turning above all that the times of targets need [°/s].
+APPROACH_TURNING = 100.0
+# Rate of turning that slows no seam down [°/s].
 UNBOUND_TURNING = 400.0
 # Largest share of the speeds of axes [%].
-WHOLE = 100.0
-
-
-def _values(reader: ProgramReader, text: str) -> dict[str, float]:
-    """Return the numbers of an aggregate by their names."""
-    values: dict[str, float] = {}
-    for item in text.strip("{} ").rpartition(":")[2].split(","):
-        name, _, digits = item.strip().partition(" ")
-        name = name.upper()
-        if name in values:
-            raise reader.lines.fault(f"axis {name} is there twice")
-        values[name] = reader.lines.coordinate(digits)
-    return values
-
-
-def _numbers(reader: ProgramReader, values: Mapping[str, float]) -> Array:
-    missing = [name for name in "XYZABC" if name not in values]
-    if missing:
-        raise reader.lines.fault(f"has no {', '.join(missing)}")
-    return np.array([values[name] for name in "XYZABC"])
-
-
-def _read_axes(reader: ProgramReader, text: str) -> list[float]:
-    values = _values(reader, text)
-    names = [name for name in AXES if name in values]
-    reader.check_axes(names)
-    return [values[name] for name in names]
-
-
-def _read_pose(reader: ProgramReader, text: str) -> Pose:
-    # Linear motions keep the status and turn of where they begin.
-    values = _values(reader, text)
-    external = {name: value for name, value in values.items() if name.startswith("E")}
-    position, quaternion = krl_pose(_numbers(reader, values))
-    return Pose(position, quaternion, reader.external_axes(external), reader.lines.number)
-
-
-def _read_frame(reader: ProgramReader, text: str) -> SE3:
-    position, quaternion = krl_pose(_numbers(reader, _values(reader, text)))
-    return pose_of_values([*position.tolist(), *quaternion.tolist()])
-
-
-def _write_axes(axes: Mapping[str, str]) -> str:
-    return "{" + ", ".join(f"{name} {text}" for name, text in axes.items()) + "}"
-
-
-def _write_pose(pose: WrittenPose) -> str:
-    numbers = zip("XYZABC", krl_numbers(pose.position, pose.quaternion), strict=True)
-    parts = [f"{name} {value:.5f}" for name, value in numbers]
-    parts += [pose.configuration] if pose.configuration else []
-    parts += [f"{name} {text}" for name, text in pose.axes.items() if name.startswith("E")]
-    return "{" + ", ".join(parts) + "}"
-
-
-def _write_frame(pose: SE3) -> str:
-    quaternion = np.array(Quaternion(pose.rotation).coeffs())
-    return _write_pose(WrittenPose(np.array(pose.translation), quaternion, {}))
+FULL_SPEED = 100.0
 
 
 def _read_speed(reader: ProgramReader, text: str) -> float:
+    """Return a speed of the tool above 0 [m/s]."""
     value = reader.lines.number_of(text)
     if not value > 0.0:
         raise reader.lines.fault(f"$VEL.CP is {value:g} m/s, expected a number above 0")
@@ -111,17 +57,17 @@ def _read_speed(reader: ProgramReader, text: str) -> float:
 
 
 def _read_percent(reader: ProgramReader, text: str) -> float:
+    """Return a share of the axes' speed or acceleration above 0 [%]."""
     value = reader.lines.number_of(text)
-    if not 0.0 < value <= WHOLE:
-        raise reader.lines.fault(f"axes have {value:g} %, expected above 0 and up to {WHOLE:g}")
+    if not 0.0 < value <= FULL_SPEED:
+        raise reader.lines.fault(
+            f"axes have {value:g} %, expected above 0 and up to {FULL_SPEED:g}"
+        )
     return value
 
 
-_AXIS = r"[AE][1-6]\s+[^,{}]+"
-_AXES = rf"\{{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*{_AXIS}(?:,\s*{_AXIS})*\}}"
-_COORDINATE = r"[A-Z][1-6]?\s+[^,{}]+"
-_POSE = rf"\{{\s*(?:E6POS\s*:|POS\s*:|FRAME\s*:)?\s*{_COORDINATE}(?:,\s*{_COORDINATE})*\}}"
-# States of a reader: before the module, in its head, between motions, in a block, in its times.
+# States of a reader in which a statement may come: before the module, in its head, between motions
+# (body), in a block, in its times.
 _BEFORE = ("before",)
 _HEAD = ("head",)
 _BODY = ("body",)
@@ -130,6 +76,7 @@ _IN_BLOCK = ("block",)
 _IN_TIMES = ("time",)
 _SEGMENT = ("body", "block", "time")
 _PACED = ("body", "block")
+# Statement that switches an output at a target.
 TRIGGER = "TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[<output>] = <value>"
 KRL = Language(
     comment=";",
@@ -138,7 +85,7 @@ KRL = Language(
     has_output=lambda output: isinstance(output, int) and output >= 1,
     fields={
         "header": word(r"(?:ACCESS|REL|PARAM|COMMENT)\b.*"),
-        "name": word(rf"[A-Z]\w{{0,{NAME - 1}}}"),
+        "name": word(rf"[A-Z]\w{{0,{MAX_NAME_LENGTH - 1}}}"),
         "percent": Field(NUMBER, _read_percent, lambda value: f"{value:g}"),
         "speed": Field(NUMBER, _read_speed, lambda value: f"{value:.7g}"),
         "turning": number("g"),
@@ -151,9 +98,9 @@ KRL = Language(
         "value": truth("FALSE", "TRUE"),
         "event": word(".*"),
         "unit": Field(r"\d+", lambda _, text: text),
-        "axes": Field(_AXES, _read_axes, _write_axes),
-        "pose": Field(_POSE, _read_pose, _write_pose),
-        "frame": Field(_POSE, _read_frame, _write_frame),
+        "axes": Field(AXES_PATTERN, read_axes, write_axes),
+        "pose": Field(POSE_PATTERN, read_pose, write_pose),
+        "frame": Field(POSE_PATTERN, read_frame, write_frame),
     },
     statements=(
         Statement("comment", "&<header>", _BEFORE),

@@ -9,7 +9,13 @@ from typing_extensions import override
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_program import Switch
-from selfmotion.shop.controllers.krl import FASTEST, KRL, TURNING, UNBOUND_TURNING, WHOLE
+from selfmotion.shop.controllers.krl import (
+    APPROACH_SPEED,
+    APPROACH_TURNING,
+    FULL_SPEED,
+    KRL,
+    UNBOUND_TURNING,
+)
 from selfmotion.shop.controllers.pose_segments import aligned_quaternions, largest_tool_speeds
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.segment_building import Pose, times_of
@@ -83,7 +89,7 @@ class KrlReader(ProgramReader):
     def _joint_approach(self, axes: list[float]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
         facts = self.comments.facts()
-        most = WHOLE if facts is None else WHOLE * facts.approach
+        most = FULL_SPEED if facts is None else FULL_SPEED * facts.approach
         share = {name: self.settings.get(name, 0.0) for name in ("VEL", "ACC")}
         fast = [name for name, value in share.items() if not 0.0 < value <= most + _SAME_TIME]
         if fast:
@@ -97,10 +103,11 @@ class KrlReader(ProgramReader):
         """Take the pose from which the motion goes on by poses."""
         speed = self.settings.get("speed", 0.0)
         turning = max(self.settings.get(name, 0.0) for name in _TURNINGS)
-        if not (0.0 < speed <= FASTEST and turning <= TURNING):
+        if not (0.0 < speed <= APPROACH_SPEED and turning <= APPROACH_TURNING):
             raise self.lines.fault(
                 f"LIN goes to where the motion goes on at {speed:g} m/s and {turning:g}°/s, "
-                f"expected at most {FASTEST:g} m/s and {TURNING:g}°/s: nothing has judged it"
+                f"expected at most {APPROACH_SPEED:g} m/s and {APPROACH_TURNING:g}°/s: nothing "
+                f"has judged it"
             )
         self.approach(pose)
 
@@ -191,10 +198,10 @@ class KrlReader(ProgramReader):
         """Refuse shares of speeds in force that hold the axes back from the times of a block."""
         for name in ("VEL", "ACC"):
             share = self.settings.get(name, 0.0)
-            if share < WHOLE:
+            if share < FULL_SPEED:
                 raise self.lines.fault(
-                    f"BAS(#{name}_PTP) before this block is {share:g} %, expected {WHOLE:g}: less "
-                    f"holds the axes back from their times"
+                    f"BAS(#{name}_PTP) before this block is {share:g} %, expected "
+                    f"{FULL_SPEED:g}: less holds the axes back from their times"
                 )
 
     def _check_in_time(self) -> None:

@@ -8,13 +8,13 @@ from typing_extensions import override
 from selfmotion.shop.controllers.configurations import status_and_turn
 from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.krl import (
-    FASTEST,
+    APPROACH_SPEED,
+    APPROACH_TURNING,
+    FULL_SPEED,
     KRL,
-    NAME,
+    MAX_NAME_LENGTH,
     TRIGGER,
-    TURNING,
     UNBOUND_TURNING,
-    WHOLE,
 )
 from selfmotion.shop.controllers.pose_segments import PoseSegment, largest_tool_speeds, linear_poses
 from selfmotion.shop.controllers.program_draft import Draft
@@ -151,14 +151,14 @@ class KrlWriter(ProgramWriter):
     def joint_approach(self, segment: Segment) -> list[str]:
         slow, fast = (
             [self.line("set", VEL=percent), self.line("set", ACC=percent)]
-            for percent in (WHOLE * self.draft.settings.approach, WHOLE)
+            for percent in (FULL_SPEED * self.draft.settings.approach, FULL_SPEED)
         )
         return [*slow, self.line("joint approach", axes=self.axes(segment, 0)), *fast]
 
     def _slow(self) -> list[str]:
         """Return the speeds of slow linear motions."""
         share = self.draft.settings.approach
-        return self._speeds(share * FASTEST, share * TURNING)
+        return self._speeds(share * APPROACH_SPEED, share * APPROACH_TURNING)
 
     def _fast(self) -> list[str]:
         """Return the speeds below which times decide."""
@@ -224,4 +224,4 @@ def _is_straight(segment: PoseSegment) -> bool:
 
 def write_krl(file: FilePath, draft: Draft) -> None:
     """Write a program as a module that a KR C4 or C5 selects."""
-    KrlWriter(draft, module_name(file, NAME, _WORDS)).write(file)
+    KrlWriter(draft, module_name(file, MAX_NAME_LENGTH, _WORDS)).write(file)

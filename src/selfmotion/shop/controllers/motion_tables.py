@@ -1,4 +1,7 @@
-"""Joint motions as tables of numbers: columns (CSV), arrays (NPZ) or lists by name (JSON)."""
+"""Joint motions as tables of numbers: columns (CSV), arrays (NPZ) or lists by name (JSON).
+
+Writers have the parameters of all formats of motions, of which tables need neither arm nor rate.
+"""
 
 import io
 import json
@@ -22,13 +25,13 @@ from selfmotion.shop.controllers.samples import MotionSamples
 
 
 def write_table(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    """Write a table with a row for each sample."""
+    """Write a table of t, q, q̇ and q̈ with a row for each sample."""
     table = np.column_stack([motion.t, motion.q, motion.qd, motion.qdd])
     write_csv(file, column_names(motion.joint_names), table)
 
 
 def write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    """Write arrays by name."""
+    """Write arrays t, q, qd, qdd and joint_names."""
     stream = io.BytesIO()
     arrays: dict[str, Any] = {"t": motion.t, "q": motion.q, "qd": motion.qd, "qdd": motion.qdd}
     np.savez_compressed(stream, joint_names=np.array(motion.joint_names), **arrays)
@@ -36,7 +39,7 @@ def write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float 
 
 
 def write_json(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    """Write lists by name."""
+    """Write lists t, q, qd, qdd and joint_names."""
     table: dict[str, Any] = {"joint_names": list(motion.joint_names)}
     table |= {name: getattr(motion, name).tolist() for name in ("t", "q", "qd", "qdd")}
     write_text(file, json.dumps(table) + "\n")

@@ -116,7 +116,7 @@ def drafted(
     at_speeds = any(isinstance(item, FeedSegment) for item in sorted_segments)
     within = settings.deviation if at_speeds else None
     program = ControllerProgram(
-        name, ordered, sorted_segments, stated, remark=plain(why), within=within
+        name, ordered, sorted_segments, stated, remark=plain(why), feed_tolerance=within
     )
     tool = tool_from_flange(robot, settings)
     facts = ProgramFacts.of(robot, settings, list(event_seams), by_poses=frames is not None)

@@ -11,6 +11,7 @@ from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.deviations import Deviations
 from selfmotion.shop.controllers.krl_reader import KrlReader
 from selfmotion.shop.controllers.krl_writer import write_krl
+from selfmotion.shop.controllers.plan_deviation import deviation_from_plan
 from selfmotion.shop.controllers.program_draft import Draft, Joints, drafted
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import ProgramSettings
@@ -104,6 +105,6 @@ def program_deviation(
     """
     program = read or read_program(file, plan.robot)
     try:
-        return program.targets, program.deviation, program.deviation_of(plan)
+        return program.targets, program.deviation, deviation_from_plan(program, plan)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error

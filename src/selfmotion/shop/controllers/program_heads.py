@@ -49,7 +49,7 @@ def comments_before(segment: Segment) -> list[str]:
 
 def _feed_comments(program: ControllerProgram) -> list[str]:
     """Return the comments of the head about seams at feeds."""
-    within = program.within
+    within = program.feed_tolerance
     if within is None:
         return []
     return [

@@ -219,8 +219,8 @@ def header_faults(
 
 def stated_tolerance(program: ControllerProgram) -> Tolerance | None:
     """Return how far off its path a program states that it is; None where it states nothing."""
-    if program.within is not None:
-        return program.within
+    if program.feed_tolerance is not None:
+        return program.feed_tolerance
     deviation = program.deviation.path
     is_finite = np.isfinite([deviation.position, deviation.rotation]).all()
     if not is_finite or deviation.position <= 0.0:
@@ -230,7 +230,7 @@ def stated_tolerance(program: ControllerProgram) -> Tolerance | None:
 
 def unjudged_note(program: ControllerProgram) -> str:
     """Return in words what the controller decides about a program, so that it is not judged."""
-    if program.within is None:
+    if program.feed_tolerance is None:
         return "accelerations are the controller's, and not judged"
     return (
         "seams at their feeds are judged with the ramps of the plan: how the controller runs up "

@@ -12,11 +12,12 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_axes import Axis
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
-from selfmotion.shop.controllers.feed_segments import Ramps, times_at
+from selfmotion.shop.controllers.feed_segments import nominal_target_times
 from selfmotion.shop.controllers.program_comments import Comments
 from selfmotion.shop.controllers.program_facts import Load
 from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_texts import DURATION_HEADING
+from selfmotion.shop.controllers.ramps import Ramps
 from selfmotion.shop.controllers.segment_building import Pose, ProgramFrames, Row, SegmentBuilder
 from selfmotion.shop.controllers.statements import Language
 from selfmotion.shop.controllers.work_objects import WORLD
@@ -334,7 +335,7 @@ class ProgramReader:
             )
         speeds = [target.speed for target in run]
         vias = np.array([[np.nan] * 3 if x.via is None else x.via.position for x in run])
-        feed_times = times_at(
+        feed_times = nominal_target_times(
             np.array([x.position for x in places if isinstance(x, Pose)]), vias, speeds
         )
         if not (np.diff(feed_times) > 0.0).all():

@@ -113,7 +113,7 @@ class ProgramWriter(ABC):
         if not isinstance(segment, PoseSegment):
             return self.line("joint", axes=self.joint_target(segment, k), **values)
         pose = self.pose(segment, k)
-        if not (isinstance(segment, FeedSegment) and segment.goes_round(k)):
+        if not (isinstance(segment, FeedSegment) and segment.is_circular(k)):
             return self.line(linear, pose=pose, **values)
         return self.line("circular", via=self.pose(segment.middles, k - 1), pose=pose, **values)
 

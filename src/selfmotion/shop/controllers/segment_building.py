@@ -10,7 +10,7 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
 from selfmotion.shop.controllers.arcs import put_on_arcs
 from selfmotion.shop.controllers.controller_axes import Axis, tool_from_flange
-from selfmotion.shop.controllers.feed_segments import FeedSegment, times_at
+from selfmotion.shop.controllers.feed_segments import FeedSegment, nominal_target_times
 from selfmotion.shop.controllers.pose_segments import PoseSegment, aligned_quaternions, linear_poses
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.segments import Segment, subdivided
@@ -260,7 +260,11 @@ class SegmentBuilder:
         frames, order = self._frames_and_order()
         positions = np.array([pose.position for pose in row.poses])
         at_speeds = bool(row.speeds)
-        t = times_at(positions, row.vias, row.speeds) if at_speeds else times_of(row.seconds)
+        t = (
+            nominal_target_times(positions, row.vias, row.speeds)
+            if at_speeds
+            else times_of(row.seconds)
+        )
         quaternions = aligned_quaternions(np.array([pose.quaternion for pose in row.poses]))
         externals = [k for k, axis in enumerate(self.axes) if axis.name.startswith("E")]
         if any(len(pose.external) != len(externals) for pose in row.poses):

@@ -25,8 +25,9 @@ from selfmotion.planning.result import (
     write_kept,
 )
 from selfmotion.problem.problem import Problem, along_other_paths
-from selfmotion.work.batch.items import LATE, Item, Row, measured
+from selfmotion.work.batch.items import Item
 from selfmotion.work.batch.maps import labels, maps
+from selfmotion.work.batch.rows import DEADLINE_REASON, Row, row_values
 
 
 def answers(plan: Plan, job: PlanRequest) -> bool:
@@ -98,7 +99,7 @@ class Folder:
             return None
         try:
             row = Row(file=self.plan_file(name), **values)
-            if row.key != item.key or row.fault or row.reason == LATE:
+            if row.key != item.key or row.fault or row.reason == DEADLINE_REASON:
                 return None
             if row.error:
                 return replace(row, settings=dict(item.settings))
@@ -108,7 +109,7 @@ class Folder:
             if plan.altered or not answers(plan, job):
                 return None
             row = replace(row, settings=dict(item.settings), goal=job.goal)
-            return replace(row, **measured(plan, job.goal))
+            return replace(row, **row_values(plan, job.goal))
         except (OSError, ValueError, TypeError, SelfmotionError):
             return None  # not written by a batch, or by another version: planned again
 

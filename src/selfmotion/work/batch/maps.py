@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from selfmotion.basics import is_number
-from selfmotion.work.batch.items import Row
+from selfmotion.work.batch.rows import Row
 
 # Of poses, what their numbers are called.
 _OF_POSES = {

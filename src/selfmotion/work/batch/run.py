@@ -25,8 +25,9 @@ from selfmotion.basics import (
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.problem.problem import Problem
 from selfmotion.work.batch.folder import Folder
-from selfmotion.work.batch.items import Item, Row, problem_items
-from selfmotion.work.batch.worker import begin_process, plan_task
+from selfmotion.work.batch.items import Item, problem_items
+from selfmotion.work.batch.rows import Row
+from selfmotion.work.batch.worker import begin_process, plan_described
 
 # Problems submitted per worker, so that none waits for the next one.
 _PER_WORKER = 2
@@ -236,11 +237,11 @@ class _Run:
         while pending or running:
             while pending and len(running) < window:
                 item = pending.popleft()
-                task = self._task(item)
-                if task is None:
+                description = self._description(item)
+                if description is None:
                     continue
                 try:
-                    running[executor.submit(plan_task, task)] = item
+                    running[executor.submit(plan_described, description)] = item
                 except BrokenExecutor:
                     return [*self._record_finished(running), item]
             done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -257,16 +258,16 @@ class _Run:
                     self._finish(item, {"error": message, "fault": True}, b"")
         return []
 
-    def _task(self, item: Item) -> dict[str, Any] | None:
-        """Return the task of a worker; None if there is nothing to do."""
+    def _description(self, item: Item) -> dict[str, Any] | None:
+        """Return what a worker needs to plan an item; None if there is nothing to do."""
         row = self._folder.finished(item)
         if row is not None:
             self.rows[item.name] = row
             self.resumed += 1
-            item.forget()
+            item.drop_description()
             return None
         try:
-            return {**item.task, "deadline": self._deadline}
+            return {**item.description, "deadline": self._deadline}
         except SelfmotionError as error:
             self._finish(item, {"error": str(error)}, b"")
             return None
@@ -301,10 +302,10 @@ class _Run:
     def _finish(self, item: Item, result: dict[str, Any], archive: bytes) -> None:
         """Record the result of an item in the folder, and report the progress."""
         file = self._folder.plan_file(item.name)
-        goal = item.task["options"]["goal"] if archive else "best"
+        goal = item.description["options"]["goal"] if archive else "best"
         row = Row(item.name, item.key, file, dict(item.settings), goal=goal, **result)
         self.rows[item.name] = self._folder.record(row, archive)
-        item.forget()
+        item.drop_description()
         done, total = len(self.rows), len(self._items)
         rate = (done - self.resumed) / max(time.monotonic() - self._began, 1e-9)
         failed = sum(bool(row.error) for row in self.rows.values())

@@ -19,7 +19,7 @@ from selfmotion.basics import (
 from selfmotion.planning.planner import PlanRequest
 from selfmotion.planning.result import ArmCache
 from selfmotion.problem.problem import problem_from_dict
-from selfmotion.work.batch.items import LATE, measured
+from selfmotion.work.batch.rows import DEADLINE_REASON, row_values
 
 # Arms and bodies of problems planned before.
 _arms = ArmCache()
@@ -27,12 +27,17 @@ _arms = ArmCache()
 _REASONS = (
     (InverseKinematicsError, "out of reach"),
     (NoSequenceError, "no way through"),
-    (DeadlineError, LATE),
+    (DeadlineError, DEADLINE_REASON),
 )
 
 
-def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
-    """Plan what `Item.task` describes.
+def plan_described(description: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+    """Plan an item by its description, with a deadline.
+
+    Parameters
+    ----------
+    description : dict
+        `Item.description`, and the ``deadline`` [s].
 
     Returns
     -------
@@ -43,15 +48,15 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     """
     began = time.perf_counter()
     try:
-        for name in task["modules"]:
+        for name in description["modules"]:
             importlib.import_module(name)
-        problem = problem_from_dict(task["problem"], _arms.of(task["files"]))
-        deadline = task["deadline"]
+        problem = problem_from_dict(description["problem"], _arms.of(description["files"]))
+        deadline = description["deadline"]
         limit = {} if deadline is None else {"deadline": deadline}
-        found = PlanRequest(problem, **task["options"]).plan(**limit)
+        plan = PlanRequest(problem, **description["options"]).plan(**limit)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
-            found.save(file)
+            plan.save(file)
             archive = file.read_bytes()
     except SelfmotionError as error:
         reason = next((text for kind, text in _REASONS if isinstance(error, kind)), "no plan")
@@ -61,8 +66,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
-    identity_of = measured(found, task["options"]["goal"])
-    return {**identity_of, "seconds": time.perf_counter() - began}, archive
+    values = row_values(plan, description["options"]["goal"])
+    return {**values, "seconds": time.perf_counter() - began}, archive
 
 
 def begin_process() -> None:

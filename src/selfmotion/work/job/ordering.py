@@ -172,7 +172,7 @@ class Ordering:
             self.states.append(State(seam, plan, not turned, mirrored=True))
         self.__dict__.pop("estimates", None)
 
-    def own(self, state: int) -> float:
+    def cost_of(self, state: int) -> float:
         """Return the cost of a state without moves [s]."""
         return self._price * self.states[state].plan.report.cost
 
@@ -300,7 +300,7 @@ class Ordering:
             before.after,
             before.after_any,
             np.array([place[self.states[k].seam] for k in present]),
-            np.array([self.own(k) for k in present]),
+            np.array([self.cost_of(k) for k in present]),
             between,
             first,
             last,

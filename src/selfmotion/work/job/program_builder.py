@@ -1,4 +1,4 @@
-"""From an order to a program: moves are planned, and the order again where they take longer."""
+"""From seams in the best order to a program, with the moves between them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from selfmotion.basics import (
-    Array,
-)
+from selfmotion.basics import Array
 from selfmotion.planning.result import Move
 from selfmotion.work.job.obstructing import ObstructingBuilder
 from selfmotion.work.job.order import EXACT
@@ -19,17 +17,37 @@ from selfmotion.work.job.step import Step
 from selfmotion.work.job.work import Work, seam_steps
 
 # Orders that are tried at most, where the best order is computed exactly.
-_ORDERS = 200
+_MAX_ORDERS = 200
 # Orders that are tried at most, where there are too many seams for that.
-_ORDERS_OF_MANY = 12
+_MAX_ORDERS_OF_MANY = 12
 # Penalty of a move that was not found, where every order needs one [s].
-_GAP = 1e6
-# From which state to which one; None is the start or the end of the program.
-Pair = tuple[int | None, int | None]
+_MISSING_MOVE = 1e6
+# States that a move leads from and to; None is the start or the end of the program.
+_StatePair = tuple[int | None, int | None]
 
 
-class Builder:
-    """Builds the program of a job.
+def build_program(ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> Program:
+    """Return the program of a job; seams without a motion are named in it.
+
+    Parameters
+    ----------
+    ordering : Ordering
+        The states of all seams; gets the times of moves.
+    work : Work
+        Plans the moves.
+    ends : ((n,) or None, (n,) or None)
+        Where the program begins and ends.
+    """
+    if any(seam.leaves for seam in ordering.seams):
+        return ObstructingBuilder(ordering, work, ends).program()
+    return _ProgramBuilder(ordering, work, ends).program()
+
+
+class _ProgramBuilder:
+    """Builds the program of a job whose seams leave no obstacles behind.
+
+    The first order is the best by lower bounds of the times of moves. Its moves are planned; where
+    they take longer, the best order is computed again, until all moves of one are planned.
 
     Parameters
     ----------
@@ -41,99 +59,109 @@ class Builder:
 
     def __init__(self, ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> None:
         self._ordering, self._work, self._ends = ordering, work, ends
+        self._moves: dict[_StatePair, Move] = {}
         self._notes: list[str] = []
 
     def program(self) -> Program:
         """Return the program; seams without a motion are named in it."""
-        if any(seam.leaves for seam in self._ordering.seams):
-            return ObstructingBuilder(self._ordering, self._work, self._ends).program()
-        return self._of_moves()
-
-    def _of_moves(self) -> Program:
-        ordering, moves = self._ordering, dict[Pair, Move]()
-        bound = ordering.best().bound
-        best: tuple[float, tuple[int, ...]] = (np.inf, ())
-        exact = len(ordering.planned) <= EXACT
-        for _ in range(_ORDERS if exact else _ORDERS_OF_MANY):
-            found = ordering.best()
-            if not found.states:
-                break
-            wanted = [pair for pair in self._pairs(found.states) if pair not in moves]
-            self._plan(wanted, moves)
-            cost = self._cost(found.states, moves)
-            bound = max(bound, found.bound) if exact else bound
-            if np.isfinite(cost):
-                best = min(best, (cost, found.states))
-            # Moves not planned yet are estimated below what they take: no other order is better.
-            if not wanted or (np.isfinite(cost) and not exact):
-                break
-        states = best[1] or self._with_gaps(moves)
+        states, bound = self._best_order()
+        if not states:
+            states = self._order_with_gaps()
         return Program(
             self._work.settings.robot,
-            tuple(self._steps(states, moves)),
-            dict(ordering.missing),
+            tuple(self._steps(states)),
+            dict(self._ordering.missing),
             bound,
             tuple(self._notes),
         )
 
-    def _with_gaps(self, moves: dict[Pair, Move]) -> tuple[int, ...]:
-        """Return the order with the fewest moves that are not found."""
-        for pair, move in moves.items():
+    def _best_order(self) -> tuple[tuple[int, ...], float]:
+        """Return the states of the cheapest order whose moves are all found, and a lower bound.
+
+        No states where no such order is found; the bound is on the cost of any order [s].
+        """
+        ordering = self._ordering
+        bound = ordering.best().bound
+        cheapest: tuple[float, tuple[int, ...]] = (np.inf, ())
+        is_exact = len(ordering.planned) <= EXACT
+        for _ in range(_MAX_ORDERS if is_exact else _MAX_ORDERS_OF_MANY):
+            candidate = ordering.best()
+            if not candidate.states:
+                break
+            unplanned = self._unplanned_pairs(candidate.states)
+            self._plan_moves(unplanned)
+            cost = self._cost(candidate.states)
+            bound = max(bound, candidate.bound) if is_exact else bound
+            if np.isfinite(cost):
+                cheapest = min(cheapest, (cost, candidate.states))
+            # Moves not planned yet are estimated below what they take: no other order is better.
+            if not unplanned or (np.isfinite(cost) and not is_exact):
+                break
+        return cheapest[1], bound
+
+    def _order_with_gaps(self) -> tuple[int, ...]:
+        """Return the states of the order with the fewest moves that are not found."""
+        for pair, move in self._moves.items():
             if not move.verified:
-                self._ordering.record_time(*pair, _GAP)
+                self._ordering.record_time(*pair, _MISSING_MOVE)
         states = self._ordering.best().states
-        self._plan([pair for pair in self._pairs(states) if pair not in moves], moves)
+        self._plan_moves(self._unplanned_pairs(states))
         return states
 
-    def _pairs(self, states: Sequence[int]) -> list[Pair]:
+    def _unplanned_pairs(self, states: Sequence[int]) -> list[_StatePair]:
+        """Return the moves of an order that are not planned yet."""
+        return [pair for pair in self._pairs(states) if pair not in self._moves]
+
+    def _pairs(self, states: Sequence[int]) -> list[_StatePair]:
+        """Return the moves of an order, with those from the start and to the end if given."""
         start, end = self._ends
         first = [] if start is None else [(None, states[0])]
         last = [] if end is None else [(states[-1], None)]
         return [*first, *pairwise(states), *last]
 
-    def _plan(
-        self,
-        wanted: Sequence[Pair],
-        moves: dict[Pair, Move],
-    ) -> None:
-        """Plan moves, and record their times in the ordering."""
-        ends = [(*self._ends_of(pair), ()) for pair in wanted]
-        names = [self._ordering.name_of_move(*pair) for pair in wanted]
-        for pair, move in zip(wanted, self._work.moves(ends, names), strict=True):
-            moves[pair] = move
-            seconds = move.motion.duration if move.verified else np.inf
-            self._ordering.record_time(*pair, seconds)
+    def _plan_moves(self, pairs: Sequence[_StatePair]) -> None:
+        """Plan moves, record their times in the ordering, and note those that are not found."""
+        ends = [(*self._move_ends(pair), ()) for pair in pairs]
+        names = [self._ordering.name_of_move(*pair) for pair in pairs]
+        moves = self._work.moves(ends, names)
+        for pair, name, move in zip(pairs, names, moves, strict=True):
+            self._moves[pair] = move
+            duration = move.motion.duration if move.verified else np.inf
+            self._ordering.record_time(*pair, duration)
             if not move.verified:
-                name = self._ordering.name_of_move(*pair)
                 self._notes.append(f"'{name}' is dropped: {move.trouble}")
 
-    def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
+    def _move_ends(self, pair: _StatePair) -> tuple[Array, Array]:
         """Return start and end of a move, (n,) each."""
-        states, (one, other) = self._ordering.states, pair
-        first = self._ends[0] if one is None else states[one].ends[1]
-        last = self._ends[1] if other is None else states[other].ends[0]
-        if first is None or last is None:
+        states, (origin, destination) = self._ordering.states, pair
+        start = self._ends[0] if origin is None else states[origin].ends[1]
+        end = self._ends[1] if destination is None else states[destination].ends[0]
+        if start is None or end is None:
             raise RuntimeError("a move has an end that is not given")
-        return first, last
+        return start, end
 
-    def _cost(self, states: Sequence[int], moves: dict[Pair, Move]) -> float:
-        found = [moves[pair] for pair in self._pairs(states)]
-        if not all(move.verified for move in found):
+    def _cost(self, states: Sequence[int]) -> float:
+        """Return the cost of an order whose moves are planned [s]; inf where one is not found."""
+        moves = [self._moves[pair] for pair in self._pairs(states)]
+        if not all(move.verified for move in moves):
             return float(np.inf)
-        own = sum(self._ordering.own(state) for state in states)
-        return own + sum(move.motion.duration for move in found)
+        seams = sum(self._ordering.cost_of(state) for state in states)
+        return seams + sum(move.motion.duration for move in moves)
 
-    def _steps(self, states: Sequence[int], moves: dict[Pair, Move]) -> list[Step]:
-        pairs, steps = self._pairs(states), list[Step]()
-        by_last = {pair[1]: pair for pair in pairs}
+    def _steps(self, states: Sequence[int]) -> list[Step]:
+        """Return the steps of an order: its seams, each after the move to it, and the last move."""
+        steps = list[Step]()
+        move_to = {pair[1]: pair for pair in self._pairs(states)}
         for state in states:
-            if state in by_last:
-                pair = by_last[state]
-                steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
-            here = self._ordering.states[state]
-            seam = self._ordering.seams[here.seam]
+            if state in move_to:
+                steps.append(self._move_step(move_to[state]))
+            motion = self._ordering.states[state]
+            seam = self._ordering.seams[motion.seam]
             plan = self._ordering.plan_of(state)
-            steps += seam_steps(seam, plan, here.turned, self._work)
-        if None in by_last:
-            steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
+            steps += seam_steps(seam, plan, motion.turned, self._work)
+        if None in move_to:
+            steps.append(self._move_step(move_to[None]))
         return steps
+
+    def _move_step(self, pair: _StatePair) -> Step:
+        return Step(self._ordering.name_of_move(*pair), self._moves[pair])

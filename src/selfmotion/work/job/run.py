@@ -47,7 +47,7 @@ from selfmotion.work.job.checks import (
 from selfmotion.work.job.earlier_program import EarlierProgram, check_earlier
 from selfmotion.work.job.ordering import Ordering
 from selfmotion.work.job.program import Program
-from selfmotion.work.job.program_builder import Builder
+from selfmotion.work.job.program_builder import build_program
 from selfmotion.work.job.result_cache import ResultCache
 from selfmotion.work.job.seam import Seam
 from selfmotion.work.job.specification import Specification
@@ -262,7 +262,7 @@ class _JobPlanner:
         if not ordering.states:
             reasons = "".join(f"\n  '{seam}': {why}" for seam, why in ordering.missing.items())
             raise PlanError(f"{self.settings.robot.name}: no seam has a motion:{reasons}")
-        program = Builder(ordering, work, self.ends).program()
+        program = build_program(ordering, work, self.ends)
         return replace(program, specification=self.specification)
 
     def _as_before(self, earlier: EarlierProgram) -> tuple[Program | None, dict[str, str], str]:
@@ -291,10 +291,10 @@ class _JobPlanner:
         """
         if not ordering.states:
             return
-        yield Builder(ordering, work, self.ends).program()
+        yield build_program(ordering, work, self.ends)
         if ordering.has_unchanged and self._is_free and not ordering.is_free:
             ordering.free(order=True, directions=False)
-            yield Builder(ordering, work, self.ends).program()
+            yield build_program(ordering, work, self.ends)
         if ordering.has_unchanged:
             ordering.free(order=self._is_free, directions=True)
-            yield Builder(ordering, work, self.ends).program()
+            yield build_program(ordering, work, self.ends)

@@ -242,9 +242,10 @@ class _There:
     """Plans in other processes."""
 
     def __init__(self, places: Places, box: Box, executor: Executor, progress: Progress) -> None:
-        tasks = [Item("place", lambda p=item: PlanRequest(p)).task for item in places.problems]  # type: ignore[misc]
-        sent = described(places, [task["problem"] for task in tasks])
-        self._modules = sorted({name for task in tasks for name in task["modules"]})
+        items = [Item("place", lambda p=item: PlanRequest(p)) for item in places.problems]  # type: ignore[misc]
+        descriptions = [item.description for item in items]
+        sent = described(places, [each["problem"] for each in descriptions])
+        self._modules = sorted({name for each in descriptions for name in each["modules"]})
         self._sent, self._box, self._executor = json.dumps(sent), box, executor
         self._progress = progress
         self.tried = list[Tried]()
