@@ -528,3 +528,9 @@ def test_torques_are_judged_along_the_smooth_way(tmp_path: Path) -> None:
     plan, file = sm.load_plan(tmp_path / "seam.npz"), tmp_path / "seam.src"
     sm.files.write_motion(plan, file, settings=settings("joints"))
     assert invoke("check", file, "--robot", tmp_path / "seam.npz")[0] == 0
+
+
+def test_a_head_with_numbers_that_are_none_is_one_that_was_changed() -> None:
+    """Whole numbers beyond all floats, too."""
+    for text in (f'held joints: {{"rail": 1{400 * "0"}}}', "load: [1]", 'approach: "fast"'):
+        assert ProgramFacts.stated([text]).is_changed, text

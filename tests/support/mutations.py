@@ -173,6 +173,12 @@ def good_files() -> tuple[Good, ...]:
         plan.save(folder / "plan.npz")
         content = (folder / "plan.npz").read_bytes()
         found += [Good("plan", ".npz", content, sm.load_plan)] * 2
+        seam = sm.Seam("seam", problem.path, problem.task)
+        sm.plan_job(arm, [seam], branches=1, clearance=None).save(folder / "a.program")
+        sm.plan_in_parts(problem).save(folder / "a.parts")
+        for suffix, read in ((".program", sm.load_program), (".parts", sm.files.load_parts)):
+            content = (folder / f"a{suffix}").read_bytes()
+            found += [Good("several plans", suffix, content, read)] * 2
     return tuple(found)
 
 
@@ -194,8 +200,8 @@ def _pose_programs(folder: Path) -> list[Good]:
 def mutated(good: Good, rng: np.random.Generator) -> bytes:
     """Return the content of a file, changed in one to three ways."""
     content = good.content
-    packed = good.suffix in (".npz", ".npy")
-    if good.suffix == ".npz" and rng.random() < 0.75:
+    packed = good.suffix in (*_ARCHIVES, ".npy")
+    if good.suffix in _ARCHIVES and rng.random() < 0.75:
         return _repacked(content, rng)
     if good.suffix == ".npy" and rng.random() < 0.5:
         return _announced(content, rng)
@@ -298,6 +304,8 @@ def _bomb(content: bytes, rng: np.random.Generator) -> bytes:
     return _ANCHORS + content
 
 
+# Suffixes of archives of several members.
+_ARCHIVES = (".npz", ".program", ".parts")
 _BYTES = (_flip, _cut, _hole, _nul)
 _TEXT = (_encoded, _lines, _lines, _tokens, _tokens, _tokens, _number, _number, _number)
 _TEXT = (*_TEXT, _long, _deep, _bomb)
@@ -314,12 +322,14 @@ def _repacked(content: bytes, rng: np.random.Generator) -> bytes:
             del members[name]
         case 1:
             members[name], members[other] = members[other], members[name]
-        case 2:
+        case 2 if name.endswith(".npy"):
             members[name] = _announced(members[name], rng)
         case 3:
             members[name] = _flip(members[name], rng)
         case 4:
             return _zip_bomb(name)
+        case _ if "bundle.json" in members:
+            members["bundle.json"] = _worded(members["bundle.json"], rng)
         case _:
             name = "description.npy" if "description.npy" in members else name
             members[name] = _described(members[name], rng)
@@ -334,10 +344,7 @@ def _described(member: bytes, rng: np.random.Generator) -> bytes:
     """Change the text that an array of bytes holds, or numbers of one that holds numbers."""
     array = np.load(io.BytesIO(member))
     if array.dtype == np.uint8:
-        text = array.tobytes()
-        for _ in range(int(rng.integers(1, 3))):
-            text = (_tokens, _number, _number, _deep)[int(rng.integers(4))](text, rng)
-        array = np.frombuffer(text, np.uint8)
+        array = np.frombuffer(_worded(array.tobytes(), rng), np.uint8)
     elif array.size and array.dtype.kind == "f":
         array = array.copy()
         array.flat[int(rng.integers(array.size))] = rng.choice([np.nan, np.inf, 1e300, -1.0])
@@ -346,6 +353,13 @@ def _described(member: bytes, rng: np.random.Generator) -> bytes:
     out = io.BytesIO()
     np.save(out, array)
     return out.getvalue()
+
+
+def _worded(text: bytes, rng: np.random.Generator) -> bytes:
+    """Change words and numbers of a text."""
+    for _ in range(int(rng.integers(1, 3))):
+        text = (_tokens, _number, _number, _deep)[int(rng.integers(4))](text, rng)
+    return text
 
 
 _SHAPES = ("(1000000000,)", "(9000000000000000000, 9)", "(-1,)", "()", "(0, 0)", "(3, 1, 1, 1)")

@@ -212,7 +212,7 @@ def load_parts(file: str | FilePath) -> Parts:
         # Files of older versions have none: the default.
         tolerance = Tolerance(**description.get("tolerance", {}))
         altered = str(description.get("altered", ""))
-    except (KeyError, TypeError, ValueError, SelfmotionError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, SelfmotionError) as error:
         raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
     plans = tuple(item for item in items if isinstance(item, Plan))
     moves = tuple(item for item in items if isinstance(item, Move))

@@ -143,7 +143,14 @@ class ProgramFacts:
                 event: None if value is None else (str(value[0]), bool(value[1]))
                 for event, value in json.loads(statements.get(_OUTPUTS, "{}")).items()
             }
-        except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
+        except (
+            ValueError,
+            ArithmeticError,
+            TypeError,
+            AttributeError,
+            LookupError,
+            RecursionError,
+        ):
             return cls(is_changed=True)
         return cls(flange, held, outputs, statements.get(_UNIT, ""), load, approach, changed)
 

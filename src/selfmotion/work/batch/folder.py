@@ -110,7 +110,7 @@ class Folder:
                 return None
             row = replace(row, settings=dict(item.settings), goal=job.goal)
             return replace(row, **row_values(plan, job.goal))
-        except (OSError, ValueError, TypeError, SelfmotionError):
+        except (OSError, ValueError, TypeError, OverflowError, SelfmotionError):
             return None  # not written by a batch, or by another version: planned again
 
     def record(self, row: Row, archive: bytes) -> Row:

@@ -47,7 +47,14 @@ def load_program(file: str | Path) -> Program:
         specification = None if values is None else Specification.from_dict(values, robot)
         if not math.isfinite(bound):
             raise ValueError(f"bound is {bound}, not finite")
-    except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (
+        SelfmotionError,
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        OverflowError,
+    ) as error:
         raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
