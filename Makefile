@@ -25,11 +25,11 @@ test: $(READY)  ## all tests but those of `test-site`, on two cores
 test-site: $(READY)  ## long tests: the site, pages in a browser, the study of the paper
 	$(BIN)/pytest $(TWO) $(BY_FILE) -m site
 
-check: $(READY)  ## style, types, layers and all tests below 0.05 s, on a few arms: a minute
+check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync style quick
 
 quick: $(READY)
-	$(BIN)/pytest $(TWO) --dist worksteal -m 'not site' --below 0.05 --arms few
+	$(BIN)/pytest $(TWO) --dist worksteal -m 'not site' --below 0.1 --arms few
 
 # What plans, and what is computed with it: the rest reads and writes files and pages.
 PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
