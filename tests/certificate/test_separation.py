@@ -382,6 +382,7 @@ def near_bodies(panda: sm.RobotModel) -> sm.Plan:
     )
 
 
+@pytest.mark.site
 def test_the_closest_approach_of_each_obstacle_is_that_of_dense_samples(
     panda: sm.RobotModel,
 ) -> None:

@@ -604,6 +604,7 @@ def test_a_begin_that_was_changed_is_not_verified(
     assert "its first axis target is 0.349 rad or m from where its first pose has the arm" in told
 
 
+@pytest.mark.site
 def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_path: Path) -> None:
     """Their steps may be shorter than a zone."""
     start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])

@@ -119,6 +119,7 @@ LIMITS = (
 )
 
 
+@pytest.mark.site
 def test_all_clearances_are_kept() -> None:
     """With the ball in the second one the arm is stopped as with the ball in the only one."""
     panda, q = robot_named("panda"), np.array(sm.NAMED_ARMS["panda"].home)

@@ -31,6 +31,7 @@ def late_by(replanner: Replanner, path: sm.paths.Path, seconds: float) -> tuple[
     return np.array([segment.delay for segment in segments]), np.array(off)
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     "constraints",
     [
@@ -106,6 +107,7 @@ class Out(sm.paths.Path):
         return sm.paths.PathSamples(t, places, turns, np.outer(speed, along))
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("distance", [0.29, 0.3, 0.33])
 def test_where_a_path_leaves_reach_the_tool_waits_on_it(
     panda: sm.RobotModel, distance: float

@@ -55,6 +55,7 @@ def test_the_judges_of_segments_reject_what_is_broken() -> None:
     assert changed_rests([(segment, place), (stale, place)]) > SAME
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("is_proved", [True, False])
 def test_the_proof_alone_stops_the_arm(monkeypatch: pytest.MonkeyPatch, *, is_proved: bool) -> None:
     """Plans that see no body: with the proof no segment comes too near, without it some do."""

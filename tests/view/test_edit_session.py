@@ -100,6 +100,7 @@ def test_what_stops_a_plan_is_told_and_drawn_and_the_next_one_follows(page):
     assert "stopped" not in page.messages[-1]
 
 
+@pytest.mark.site
 def test_places_in_reach_are_told_while_something_is_chosen(page):
     """They are those of the document that is shown: a path that is lifted has others."""
 
