@@ -88,10 +88,29 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
     if blank is not None:
         raise FileFormatError(f"{file}: line {blank}: names no seam")
+    _check_rows_stand_together(file, names, lines)
     return {
         name: whole.selected([k for k, other in enumerate(names) if other == name])
         for name in dict.fromkeys(names)
     }
+
+
+def _check_rows_stand_together(file: FilePath, names: Sequence[str], lines: Sequence[int]) -> None:
+    """Refuse a seam that goes on after rows of another one.
+
+    Two tables that were put together may use a name twice; the tool would go from the one seam
+    straight to the other.
+    """
+    ended = set[str]()
+    for before, name, line in zip(names, names[1:], lines[1:], strict=False):
+        if name != before:
+            ended.add(before)
+        if name in ended:
+            raise FileFormatError(
+                f"{file}: line {line}: seam '{name}' goes on after rows of seam '{before}', "
+                f"expected its rows one after the other: give these rows a name of their own, or "
+                f"put them behind the others of '{name}'"
+            )
 
 
 def rows_of_table(
