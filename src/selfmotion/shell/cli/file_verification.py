@@ -144,7 +144,11 @@ def _between_targets(
     else:
         return []
     if failures and feeds and has_joints:
-        failures.append("linear motions (--set targets=poses) have feeds of their own")
+        failures.append(
+            "where it is in run-up or run-down, give the path a smaller acceleration, as "
+            "path.acceleration=0.3; or write linear motions (--set targets=poses), which have "
+            "the feed as their speed"
+        )
     return failures
 
 
