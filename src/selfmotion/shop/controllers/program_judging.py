@@ -101,7 +101,7 @@ def judge_program(
         (*steps, *slow_motions),
         failures,
         seam_tolerance,
-        shift_note(program),
+        shift_note(program, obstacles=_has_obstacles(job)),
         unjudged_note(program),
     )
 
@@ -147,6 +147,16 @@ def judge_motion(motion: Trajectory, job: Program) -> ProgramVerdict:
         *_end_faults(job, sequence, JOINT_ROUNDING),
     )
     return ProgramVerdict(steps, failures)
+
+
+def _has_obstacles(job: Program) -> bool:
+    """Return whether a job keeps clear of obstacles."""
+    return any(
+        requirement.obstacles
+        for step in job.steps
+        if isinstance(step.made, Plan)
+        for requirement in step.made.requirements
+    )
 
 
 def _job_faults(job: Program) -> Iterator[str]:
