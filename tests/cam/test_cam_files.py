@@ -351,6 +351,16 @@ def test_tables_name_seams_and_events(tmp_path: Path) -> None:
     assert right.events == (("arc off", right.path.duration),)
 
 
+def test_a_seam_of_a_table_does_not_go_on_after_another_one(tmp_path: Path) -> None:
+    """Two tables put together may use a name twice: the tool would weld from one to the other."""
+    rows = ["seam,x,y,z"]
+    rows += [f"{name},{x},{y},0" for y, name in enumerate("aba") for x in (0, 1)]
+    file = written(tmp_path, "seams.csv", "\n".join(rows) + "\n")
+    said = "line 6: seam 'a' goes on after rows of seam 'b'"
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(file, seam="b", feed=0.1)
+
+
 @pytest.mark.parametrize("listed", [False, True])
 @pytest.mark.parametrize("ramp", ["", "ramp = 0.3\n"])
 @pytest.mark.parametrize("leads", ["", "leads = { length_mm = 30, duration = 0.7 }\n"])

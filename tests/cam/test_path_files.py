@@ -546,3 +546,17 @@ def test_what_no_program_writes_is_refused_in_one_line(
     with pytest.raises(sm.errors.FileFormatError, match=said) as caught:
         sm.files.read_path(file, feed=0.1)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "title", ["x [m/s]", "x (mm/s)", "x [rad]", "roll [m]", "nx [mm]", "t [m]"]
+)
+def test_a_unit_of_another_quantity_is_no_unit_of_a_column(title: str, tmp_path: Path) -> None:
+    """A table of speeds is none of positions."""
+    name = title.split()[0]
+    header = "x,y,z,nx,ny,nz,roll,t".replace(name, title, 1)
+    file = tmp_path / "seam.csv"
+    file.write_text(f"{header}\n" + "0,0,0,0,0,1,0,0\n" * 2)
+    with pytest.raises(sm.errors.FileFormatError, match="unknown column") as refused:
+        sm.files.read_path(file)
+    assert name in str(refused.value)

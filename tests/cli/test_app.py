@@ -101,7 +101,6 @@ MU, MOST = "costs.InverseManipulability.mu", "max_evaluations"
         (("plan", "panda", "--path", "no.csv"), "error: no.csv: cannot be read"),
         (("plan", "a.dxf"), "error: a.dxf: is a path, expected a robot or a problem file first"),
         (("plan", "a.npz"), "error: a.npz: holds motions that are planned, expected a robot or a"),
-        (("job", "a.program"), "error: a.program: has suffix '.program', expected .toml, .json or"),
         (("plan", "panda", *on_circle("0.1"), "--start", "1,2"), "shape (2,), expected (7,)"),
         (("plan", "panda", *on_circle("0.1"), "--start", "a"), "error: --start is 'a'"),
         (("plan", "panda", *on_line("1,2")), "error: by: is [1.0, 2.0], expected three numbers"),

@@ -23,7 +23,7 @@ from selfmotion.shop.controllers.ramps import Ramps
 from support.arms import robot_named
 from support.industrial import industrial_arm
 from support.played_programs import Off, off, read_poses
-from support.shell import invoke
+from support.shell import in_full, invoke
 
 FILES = ("weld.mod", "weld.src", "weld.script")
 ROUND = {"weld.mod": "MoveC ", "weld.src": "SCIRC ", "weld.script": "movec("}
@@ -652,3 +652,51 @@ def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
     # Where more is allowed it is at its feed.
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
     assert not read_program(file, abb).timed_reasons
+
+
+_CLAMPED = """
+task = "pointing"
+[robot]
+name = "ur5"
+tool_offset = { position_mm = [0, 0, 120] }
+[workpiece]
+frame = { position = [0.45, 0.0, 0.2] }
+[[workpiece.obstacles]]
+shape = "box"
+name = "clamp"
+position_mm = [40, 130, 60]
+size_mm = [100, 20, 120]
+[path]
+kind = "line"
+start = { position = [0, 0, 0], rpy_deg = [180, 0, 0] }
+by_mm = [80, 0, 0]
+feed_mm = 40
+"""
+
+
+def test_a_part_that_was_moved_is_moved_in_the_program_and_in_the_file(tmp_path: Path) -> None:
+    """By the plan its path is shifted and obstacles are not, which is said; by the file neither."""
+    cell, plan, file = tmp_path / "cell.toml", tmp_path / "weld.npz", tmp_path / "weld.mod"
+    cell.write_text(_CLAMPED)
+    sm.plan(sm.read_problem(cell)).require().save(plan)
+    asked = sm.files.ProgramSettings(mass=2.0, targets="poses", work_object="path")
+    sm.files.write_motion(sm.load_plan(plan), file, settings=asked)
+    written = file.read_text()
+    # The frame of the controller's base is turned by half a turn.
+    shifted = written.replace('"", [[-450.0000, 0.0000,', '"", [[-450.0000, -60.0000,')
+    assert shifted != written
+    file.write_text(shifted)
+    code, text, notes = in_full("check", file, "--robot", plan)
+    assert code == 0, text
+    assert "obstacles where they were planned" in notes
+    moved = "workpiece.frame.position=[0.45, 0.06, 0.2]"
+    code, text, notes = in_full("check", file, "--robot", cell, "--set", moved)
+    assert code == 0, text
+    assert "so is the path by which it is judged" in notes
+    # With the part elsewhere again, and where the program stayed and the part did not.
+    code, text = invoke("check", file, "--robot", cell, "--set", moved.replace("0.06", "0.03"))
+    assert code == 1
+    file.write_text(written)
+    code, text = invoke("check", file, "--robot", cell, "--set", moved)
+    assert code == 1
+    assert "60 mm off the path" in text

@@ -13,7 +13,12 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Separation
 from selfmotion.shell.cli import file_verification
 from selfmotion.shop import controllers
-from selfmotion.shop.controllers import judge_program, program_deviation, read_program
+from selfmotion.shop.controllers import (
+    judge_program,
+    judged_by_plan,
+    program_deviation,
+    read_program,
+)
 from selfmotion.shop.controllers.controller_axes import axes_of, tool_from_flange
 from selfmotion.shop.controllers.deviations import NO_DEVIATION
 from selfmotion.shop.controllers.operations import Operation
@@ -332,11 +337,8 @@ def test_a_program_of_a_job_is_verified_by_its_job(
         judge_program(file, other)
 
 
-@pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
-def test_a_program_of_a_plan_is_verified_as_it_is_written(
-    name: str, deviation: float, tmp_path: Path
-) -> None:
-    """By the file of its problem, feed included, though only targets are known."""
+def _cornered(feed: float) -> sm.Plan:
+    """Return a plan of an arm of six joints along a rounded corner."""
     ur5 = robot_named("ur5")
     start = ur5.dexterous_configuration("pointing")
     first = ur5.pose(start)
@@ -344,14 +346,65 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     corner.translation = first.translation - np.array([0.0, 0.0, 0.1])
     last.translation = corner.translation + np.array([0.0, 0.1, 0.0])
     way = sm.paths.Polyline([x.translation for x in (first, corner, last)], tolerance=2e-3)
-    path = sm.paths.Feed(way, 0.05)
     limits = (
         sm.constraints.JointPositionLimits(),
         sm.constraints.JointVelocityLimits(),
         sm.constraints.JointAccelerationLimits(9.0),
     )
+    path = sm.paths.Feed(way, feed)
     problem = sm.Problem(ur5, path, "position", start, constraints=limits, clearance=None)
-    made = sm.plan(problem).require()
+    return sm.plan(problem).require()
+
+
+@pytest.mark.parametrize("feed", [0.04, 0.005])
+def test_export_and_check_say_the_same_of_feeds(feed: float, tmp_path: Path) -> None:
+    """Of slow ones run-up and run-down are too short for targets no nearer than a cycle."""
+    made, file = tmp_path / "made.npz", tmp_path / "weld.src"
+    _cornered(feed).save(made)
+    code, told = invoke("export", made, "--out", file)
+    again, text = invoke("check", file, "--robot", made)
+    assert code == again == int(feed < 0.02), (told, text)
+    assert ("not verified: the feed of" in told) == ("not verified: the feed of" in text)
+    assert ("linear motions (--set targets=poses)" in told) == bool(code)
+
+
+_HUNG = """
+task = "pointing"
+clearance = false
+[robot]
+name = "ur5"
+tool_offset = { position_mm = [0, 0, 120], rpy_deg = [0, 30, 0] }
+base = { position = [0.2, 0.1, 1.5], rpy_deg = [180, 0, 40] }
+[path]
+kind = "file"
+file = "line.csv"
+feed_mm = 30
+corners = "round"
+tolerance_mm = 2
+frame = { position = [0.55, -0.2, 0.9], rpy_deg = [0, 0, 15] }
+"""
+
+
+def test_rounded_corners_between_targets_keep_a_feed(tmp_path: Path) -> None:
+    """Here only the motion through the middles of both sides lost it, in the path's own corner."""
+    (tmp_path / "line.csv").write_text(
+        "x_mm,y_mm,z_mm,nx,ny,nz\n0,0,0,0,0,-1\n60,0,0,0,0,-1\n60,40,0,0,0,-1\n"
+    )
+    (tmp_path / "hung.toml").write_text(_HUNG)
+    made = sm.plan(sm.read_problem(tmp_path / "hung.toml")).require()
+    file = tmp_path / "weld.src"
+    sm.files.write_motion(made, file)
+    certificate = judged_by_plan(read_program(file, made.robot), made)
+    assert certificate.verified, certificate.verdict
+
+
+@pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
+def test_a_program_of_a_plan_is_verified_as_it_is_written(
+    name: str, deviation: float, tmp_path: Path
+) -> None:
+    """By the file of its problem, feed included, though only targets are known."""
+    made = _cornered(0.05)
+    problem = made.problem
     sm.files.write_problem(problem, tmp_path / "cell.toml")
     asked = settings(name, deviation)
     sm.files.write_motion(made, tmp_path / name, settings=asked)

@@ -50,6 +50,8 @@ TABLES: list[tuple[str, str, str | None]] = [
      "15.748031496062994,1.9685039370078743,11.811023622047244\n", None),
     ("centimetres", "x_cm,y_cm,z [cm]\n40,-5,30\n42,0,30\n40,5,30\n", None),
     ("quotes", "'x';\"y\";'z'\n'0.4';\"-0.05\";'0.3'\n0.42;0;0.3\n0.4;0.05;0.3\n", None),
+    ("all in quotes", '"x","y","z"\n"0.4","-0.05","0.3"\n"0.42","0","0.3"\n'
+     '"0.4","0.05","0.3"\n', None),
     ("titles of messages", "\n".join(["pose.position.x,pose.position.y,pose.position.z,"
      "pose.orientation.x,pose.orientation.y,pose.orientation.z,pose.orientation.w",
      *(row[:-7].replace(" ", ",") + ",1,0,0,0" for row in _ROWS)]), None),

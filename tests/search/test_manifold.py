@@ -21,13 +21,13 @@ def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = robot_named("panda")
-    arrays = robot.chain.arrays
+    follows, arrays = standing(robot, sm.Task.POSITION), robot.chain.arrays
     wrong = arrays.tree.positions.copy()
     wrong[3, 0] += off
     tree = arrays.tree._replace(positions=wrong)
     monkeypatch.setattr(robot.chain, "table", arrays._replace(tree=tree).table)
     with pytest.raises(sm.errors.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
-        Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
+        Manifold(follows, robot.lower, robot.upper)
 
 
 @pytest.mark.parametrize(("name", "task"), CASES)

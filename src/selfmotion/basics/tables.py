@@ -15,8 +15,10 @@ from selfmotion.basics.inputs import number_in
 # Marks of comment lines.
 _COMMENTS = ("#", "%", "//")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
-# A title in quotation marks with a separator of columns in it, or such a mark itself.
-_QUOTED = re.compile(r'"[^"]*[,;\t"(\[][^"]*"')
+# A cell in quotation marks, of which two stand for one within (RFC 4180) …
+_QUOTED = re.compile(r'"(?:[^"]|"")*"')
+# … and what only such a cell has within: separators of columns, marks, brackets of a unit.
+_PROTECTED = set(",;\t\"'([")
 # Largest number of characters of a line: files with more are of another kind.
 _LONGEST = 100_000
 # Name of a column that is left out.
@@ -147,7 +149,7 @@ def _header(
 
 def _titles(line: str) -> list[str]:
     """Return the titles in a header; units in brackets belong to the word before them."""
-    joined = line if _QUOTED.search(line) else re.sub(r"\s+([\[(])", r"\1", line)
+    joined = line if _protects(line) else re.sub(r"\s+([\[(])", r"\1", line)
     titles = _cells(joined, _mark(joined))
     return titles[:-1] if titles[1:] and not titles[-1] else titles
 
@@ -165,8 +167,13 @@ def _mark(line: str) -> str:
     return mark if mark in bare else ""
 
 
+def _protects(line: str) -> bool:
+    """Return whether quotation marks hold something that is no separator, though it looks so."""
+    return any(_PROTECTED & set(cell[1:-1]) for cell in _QUOTED.findall(line))
+
+
 def _cells(line: str, mark: str) -> list[str]:
-    if mark and _QUOTED.search(line):
+    if mark and _protects(line):
         quoted = csv.reader([line], delimiter=mark, skipinitialspace=True)
         return [cell.strip() for cell in next(quoted)]
     cells = line.split(mark) if mark else line.split()

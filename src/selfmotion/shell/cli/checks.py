@@ -178,10 +178,12 @@ def of_problem(
     against = content.besides(problem.robot, problem.constraints)
     if program is not None:
         problem = controllers.problem_of_targets(problem)
-        begin = motions[0].of_joints(problem.robot.joint_names).q[0]
-        problem = controllers.as_shifted(problem, program, begin)
-        if controllers.shift_note(program):
-            stages.print(f"note: {controllers.shift_note(program)}", markup=False, soft_wrap=True)
+        ends = motions[0].of_joints(problem.robot.joint_names).q[[0, -1]]
+        given, problem = problem, controllers.as_shifted(problem, program, ends)
+        obstacles = any(item.obstacles for item in problem.requirements)
+        note = controllers.shift_note(program, moved=problem is not given, obstacles=obstacles)
+        if note:
+            stages.print(f"note: {note}", markup=False, soft_wrap=True)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         print_difference(problem.robot, motions[0])

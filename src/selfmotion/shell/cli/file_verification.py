@@ -95,7 +95,10 @@ def _verify_program(planned: Planned, target: Path) -> FileVerdict:
     """Return whether a controller's program deviates from its plan by no more than it states."""
     program = controllers.read_program(target, planned.robot)
     count, stated, measured = controllers.program_deviation(planned, target, program)
-    faults = controllers.switching_faults(program, planned)
+    faults = (
+        *controllers.switching_faults(program, planned),
+        *_between_targets(planned, target, program),
+    )
     keeps_stated = controllers.keeps_stated(measured, stated)
     deviations = [
         f"{1e3 * deviation.position:.3g} mm and {deviation.rotation:.2g} rad {where} "
@@ -117,6 +120,36 @@ def _verify_program(planned: Planned, target: Path) -> FileVerdict:
         is_verified(planned) and keeps_stated and not faults,
         f"read back: {'; '.join((targets, *remarks, *faults))}",
     )
+
+
+def _between_targets(
+    planned: Planned, target: Path, program: controllers.ControllerProgram
+) -> list[str]:
+    """Return what a program breaks of what was planned, as `check` judges it.
+
+    Of a job this is judged where targets are joints and a seam has a feed: between such targets a
+    controller may be faster or slower.
+    """
+    has_joints = program.feed_tolerance is None
+    if isinstance(planned, sm.Plan):
+        certificate = controllers.judged_by_plan(program, planned)
+        failures = [] if certificate.verified else [certificate.verdict]
+        feeds = bool(planned.problem.path.feeds)
+    elif isinstance(planned, sm.Program):
+        seams = [step.made.problem.path for step in planned.steps if isinstance(step.made, sm.Plan)]
+        feeds = any(path.feeds for path in seams)
+        judged = controllers.judge_program(target, planned) if feeds and has_joints else None
+        steps = () if judged is None else judged.steps
+        failures = [f"{step.name}: {step.verdict}" for step in steps if not step.verified]
+    else:
+        return []
+    if failures and feeds and has_joints:
+        failures.append(
+            "where it is in run-up or run-down, give the path a smaller acceleration, as "
+            "path.acceleration=0.3; or write linear motions (--set targets=poses), which have "
+            "the feed as their speed"
+        )
+    return failures
 
 
 def _verify_parts(planned: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> FileVerdict:

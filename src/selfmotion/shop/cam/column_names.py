@@ -25,9 +25,20 @@ _NAMES = {"t", "feed", *POSITION, *(name for names in ORIENTATION_COLUMNS for na
 
 # Other spellings of names.
 # Units in brackets behind a title → what its name ends in.
-_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
-_BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
-_BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
+_LENGTHS = {"m": "", "mm": "_mm", "cm": "_cm", "in": "_in", "inch": "_in"}
+_SPEEDS = {f"{unit}/s": ending for unit, ending in _LENGTHS.items()}
+_ANGLES = {"rad": "", **dict.fromkeys(("deg", "°", "degrees"), "_deg")}
+_TIMES, _NUMBERS = {"s": "", "sec": ""}, {"-": "", "1": ""}
+_BRACKETS = _LENGTHS | _SPEEDS | _ANGLES | _TIMES | _NUMBERS
+# Names → the units that their quantity may have: a speed or an angle is no position.
+_OWN_BRACKETS: Mapping[str, Mapping[str, str]] = {
+    "t": _TIMES,
+    # As in ``feed_mm``, the second may be left out.
+    "feed": _SPEEDS | _LENGTHS,
+    **dict.fromkeys(POSITION, _LENGTHS),
+    **dict.fromkeys(("roll", "pitch", "yaw", "rx", "ry", "rz"), _ANGLES),
+    **dict.fromkeys(("qw", "qx", "qy", "qz", "nx", "ny", "nz"), _NUMBERS),
+}
 _TITLE_WITH_UNIT = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 _SYNONYMS = {"time": "t", "timestamp": "t"}
 # Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
@@ -68,16 +79,23 @@ def column_name(title: str) -> str:
     name = title.strip().lower()
     match = _TITLE_WITH_UNIT.fullmatch(name)
     if match and match[2].strip() in _BRACKETS:
-        name = match[1] + _BRACKETS[match[2].strip()]
+        stem, unit = _usual_name(match[1]), match[2].strip()
+        units = _OWN_BRACKETS.get(stem, _BRACKETS)
+        return stem + units[unit] if unit in units else name
     stem, unit = name, ""
     for suffix in _UNITS:
         if name.endswith(suffix):
             stem, unit = name.removesuffix(suffix), suffix
+    return _usual_name(stem) + unit
+
+
+def _usual_name(stem: str) -> str:
+    """Return the name here of a column, without its unit."""
     if position := _POSITION_TITLES.fullmatch(stem):
-        stem = position[1] or position[2]
-    elif turn := _QUATERNION_TITLES.fullmatch(stem):
-        stem = f"q{turn[1]}"
-    return _SYNONYMS.get(stem, stem) + unit
+        return position[1] or position[2]
+    if turn := _QUATERNION_TITLES.fullmatch(stem):
+        return f"q{turn[1]}"
+    return _SYNONYMS.get(stem, stem)
 
 
 def kuka_titles(titles: Sequence[str]) -> list[str]:

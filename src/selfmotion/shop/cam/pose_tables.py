@@ -1,5 +1,6 @@
 """Reader of tables of poses, with a seam for each name in a column."""
 
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, read_rows
@@ -52,7 +53,26 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     blank = next((line for line, seam in zip(lines, seams, strict=True) if not seam), None)
     if blank is not None:
         raise FileFormatError(f"{file}: line {blank}: names no seam")
+    _check_rows_stand_together(file, seams, lines)
     return {
         seam: rows.selected([k for k, other in enumerate(seams) if other == seam])
         for seam in dict.fromkeys(seams)
     }
+
+
+def _check_rows_stand_together(file: FilePath, seams: Sequence[str], lines: Sequence[int]) -> None:
+    """Refuse a seam that goes on after rows of another one.
+
+    Two tables that were put together may use a name twice; the tool would go from the one seam
+    straight to the other.
+    """
+    ended = set[str]()
+    for before, seam, line in zip(seams, seams[1:], lines[1:], strict=False):
+        if seam != before:
+            ended.add(before)
+        if seam in ended:
+            raise FileFormatError(
+                f"{file}: line {line}: seam '{seam}' goes on after rows of seam '{before}', "
+                f"expected its rows one after the other: give these rows a name of their own, or "
+                f"put them behind the others of '{seam}'"
+            )

@@ -36,6 +36,7 @@ from selfmotion.shop.controllers.program_judging import (
     header_faults as header_faults,
     judge_motion as judge_motion,
     judge_program as judge_program,
+    judged_by_plan as judged_by_plan,
     stated_tolerance as stated_tolerance,
     unjudged_note as unjudged_note,
 )

@@ -6,16 +6,23 @@ had to keep (`step_judging`). The whole has to begin, end and switch its outputs
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from selfmotion.basics import ProblemError, RobotError
-from selfmotion.certificate import Tolerance
+from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.model.motion import Trajectory, part_of_motion
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.result import CheckedMotion, continuity_faults, end_position_faults
+from selfmotion.planning.result import (
+    CheckedMotion,
+    Plan,
+    continuity_faults,
+    end_position_faults,
+)
 from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.pose_numbers import JOINT_ROUNDING, TIME_TOLERANCE
@@ -30,9 +37,14 @@ from selfmotion.shop.controllers.step_judging import (
     slow_motion_name,
     slow_motion_verdicts,
     step_verdicts,
+    worst_certificate,
 )
 from selfmotion.shop.controllers.switching_faults import switching_faults
-from selfmotion.shop.controllers.target_constraints import constraints_of_targets
+from selfmotion.shop.controllers.target_constraints import (
+    constraints_of_lines,
+    constraints_of_targets,
+    problem_of_targets,
+)
 from selfmotion.work.job import Program
 
 # Rounding of angles in files [rad].
@@ -89,9 +101,25 @@ def judge_program(
         (*steps, *slow_motions),
         failures,
         seam_tolerance,
-        shift_note(program),
+        shift_note(program, obstacles=_has_obstacles(job)),
         unjudged_note(program),
     )
+
+
+def judged_by_plan(program: ControllerProgram, plan: Plan) -> Certificate:
+    """Return the worst certificate of the motions of a program, by all that its plan has to keep.
+
+    Within the deviation that the program states. Its work object is where it was planned.
+    """
+    problem = problem_of_targets(plan.problem)
+    on_lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
+    allowed, ending = stated_tolerance(program) or plan.tolerance, plan.report.ending
+    certificate, _ = worst_certificate(
+        program.motions(problem.path),
+        partial(problem.certify, tolerance=allowed, ending=ending),
+        partial(on_lines.certify, tolerance=allowed, ending=ending),
+    )
+    return certificate
 
 
 def judge_motion(motion: Trajectory, job: Program) -> ProgramVerdict:
@@ -119,6 +147,16 @@ def judge_motion(motion: Trajectory, job: Program) -> ProgramVerdict:
         *_end_faults(job, sequence, JOINT_ROUNDING),
     )
     return ProgramVerdict(steps, failures)
+
+
+def _has_obstacles(job: Program) -> bool:
+    """Return whether a job keeps clear of obstacles."""
+    return any(
+        requirement.obstacles
+        for step in job.steps
+        if isinstance(step.made, Plan)
+        for requirement in step.made.requirements
+    )
 
 
 def _job_faults(job: Program) -> Iterator[str]:

@@ -83,7 +83,8 @@ def _take_step(file: FilePath, remaining: deque[Segment], step: Step) -> list[Se
     if abs(duration - step.motion.duration) > TIME_TOLERANCE:
         raise FileFormatError(
             f"{file}: its targets of '{step.name}' take {duration:.6g} s, the job's "
-            f"{step.motion.duration:.6g} s: the program belongs to another job"
+            f"{step.motion.duration:.6g} s: a time, a wait or a step was changed, or the program "
+            f"belongs to another job; change it in the job, and write the program again"
         )
     return segments
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
-from selfmotion.model.path import Placed
+from selfmotion.model.path import Path, Placed
 from selfmotion.model.task import log3
 from selfmotion.planning.result import Plan
 from selfmotion.problem.problem import Problem
@@ -20,27 +20,45 @@ from selfmotion.work.job import Program
 _SHIFT_TOLERANCE = 1e-3
 
 
-def shift_note(program: ControllerProgram) -> str:
-    """Return how far the work object is from where it was planned, in words; "" for not at all."""
+def shift_note(program: ControllerProgram, *, moved: bool = True, obstacles: bool = False) -> str:
+    """Return how far the work object is from where it was planned, in words; "" for not at all.
+
+    Parameters
+    ----------
+    program : ControllerProgram
+    moved : bool
+        Whether the path was shifted with it, see `as_shifted`.
+    obstacles : bool
+        Whether there are obstacles, which are not shifted.
+    """
     if program.shift is None:
         return ""
     distance = 1e3 * float(np.linalg.norm(program.shift.translation))
     turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
+    off = f"the work object is {distance:.4g} mm and {turn:.3g}° from where it was planned"
+    if not moved:
+        return f"{off}, and so is the path by which it is judged"
+    text = f"{off}: judged along the path shifted with it"
+    if not obstacles:
+        return text
     return (
-        f"the work object is {distance:.4g} mm and {turn:.3g}° from where it was planned: judged "
-        f"along the path shifted with it"
+        f"{text}, and by obstacles where they were planned; where some moved with the part, judge "
+        f"it by a problem file with the part where it is now (--robot)"
     )
 
 
-def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Problem:
+def as_shifted(problem: Problem, program: ControllerProgram, ends: Array) -> Problem:
     """Return a problem whose path is shifted as the work object of a program is.
+
+    A problem whose path is where the motion goes, as that of a file in which the part was moved,
+    stays as it is.
 
     Parameters
     ----------
     problem : Problem
     program : ControllerProgram
-    begin : (n,)
-        Where the motion begins.
+    ends : (2, n)
+        Where the motion begins and ends.
 
     Raises
     ------
@@ -57,8 +75,17 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
             f"which moves past it: plan again with the part where it is"
         )
     path = Placed(problem.path, place * program.shift * place.inverse())
-    start = None if problem.start is None else begin
+    if _distance(problem, problem.path, ends) < _distance(problem, path, ends) - _SHIFT_TOLERANCE:
+        return problem
+    start = None if problem.start is None else ends[0]
     return replace(problem, path=path, start=start)
+
+
+def _distance(problem: Problem, path: Path, ends: Array) -> float:
+    """Return how far the tool is from both ends of a path, in all [m]."""
+    places = [problem.robot.chain.place(q).translation for q in ends]
+    wanted = [path.pose(time).translation for time in (0.0, path.duration)]
+    return float(np.linalg.norm(np.array(places) - np.array(wanted), axis=1).sum())
 
 
 def shifted_move_faults(

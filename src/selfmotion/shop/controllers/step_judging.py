@@ -64,7 +64,7 @@ def step_verdicts(
         constraints = constraint_filter(planned.problem.constraints)
         problem = replace(planned.problem, constraints=constraints)
         if program is not None:
-            problem = as_shifted(problem, program, motions[0].q[0])
+            problem = as_shifted(problem, program, motions[0].q[[0, -1]])
         tolerance = seam_tolerance or planned.tolerance
         verdicts.append(_seam_verdict(step.name, problem, tolerance, motions))
     return tuple(verdicts)

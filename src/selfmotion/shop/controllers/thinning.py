@@ -8,7 +8,7 @@ exceeds a feed or a speed limit are halved.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -48,6 +48,8 @@ _MIN_DENSITY_GROWTH = 1.05
 _DENSITY_SAFETY = 1.02
 # Largest number of targets that a controller takes.
 _MAX_TARGETS = 100_000
+# How far inside of a feed's interval its ends are looked at [s].
+_INSIDE = 1e-6
 # Smallest margin of a feed, against division by zero [m²/s²].
 _MIN_FEED_MARGIN = 1e-12
 # Number of times at which rest is tested.
@@ -221,17 +223,28 @@ class Section:
     def _exceeds_speed(self, segment: Segment) -> Flags:
         """Whether a feed or a speed limit is violated in each interval between targets, (K,).
 
-        Only where the motion itself satisfies it; on the spline through the targets, and by linear
-        interpolation. Blended corners are slower than these.
+        Only where the motion itself satisfies it; by each interpolation of a controller, at its
+        knots and where feeds begin and end, as a run-up or run-down may share an interval with one.
         """
         largest_share = np.zeros(len(segment.t) - 1)
         last = len(largest_share) - 1
-        for times, q, qd in islice(segment.motions(), 2):
+        ends = self._feed_ends()
+        for knots in segment.motions():
+            motion = Trajectory(*knots, self.operation.motion.joint_names)
+            times = np.union1d(knots.t, ends[ends < knots.t[-1]])
             interval = np.clip(np.searchsorted(segment.t, times, side="right") - 1, 0, last)
             t = np.clip(self.first + times, self.first, self.operation.motion.t[-1])
+            q, qd = motion(times), motion(times, 1)
             shares = np.maximum(self._joint_speed_shares(t, qd), self._feed_shares(t, q, qd))
             np.maximum.at(largest_share, interval, shares)
         return np.asarray(largest_share > 1.0)
+
+    def _feed_ends(self) -> Array:
+        """Return times of the section just after feeds begin and before they end, (K,) [s]."""
+        windows = [feed.during for feeds in self.operation.feeds for feed in feeds]
+        inside = np.concatenate([np.zeros((0, 2)), *windows]) + np.array([_INSIDE, -_INSIDE])
+        ends = inside.ravel() + self.operation.motion.t[0] - self.first
+        return np.asarray(ends[ends > 0.0])
 
     def _joint_speed_shares(self, t: Array, qd: Array) -> Array:
         """Return the largest share of its limit that a joint speed takes at times, (K,)."""

@@ -174,7 +174,7 @@ def _box(within: Any) -> tuple[tuple[str, ...], Box]:
     if not isinstance(within, Mapping) or not within:
         raise ProblemError(
             f"place: within is {shown(within)}, expected lowest and highest value of some of "
-            f"{', '.join(COORDINATES)}"
+            f"{', '.join(COORDINATES)}: within={{'x': (-0.2, 0.2)}} (--within x=-0.2,0.2)"
         )
     for name in within:
         if name not in COORDINATES:
