@@ -212,9 +212,14 @@ def path_rows() -> list[Row]:
     ]
 
 
+@cache
+def _sample() -> sm.Problem:
+    return sm.sample_problem()
+
+
 def problem_with(**given: Any) -> sm.Problem:
     """Return the paper's problem with other parts."""
-    sample = sm.sample_problem()
+    sample = _sample()
     parts = {"robot": sample.robot, "path": sample.path, "task": "planar", "start": sample.start}
     return sm.Problem(**{**parts, **given})
 
