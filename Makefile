@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check quick test test-site test-baseline lint style format bench short wheel docs errors three clean
+.PHONY: help demo check quick test test-site test-baseline test-interpreted lint style format bench short wheel docs errors three clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -38,6 +38,9 @@ PLANNING := $(addprefix tests/, baselines batch certificate collision constraint
 
 test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
 	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest $(TWO) $(BY_FILE) $(PLANNING)
+
+test-interpreted: $(READY)  ## cheap tests with kernels that are interpreted: a quarter of an hour
+	NUMBA_DISABLE_JIT=1 $(BIN)/pytest $(TWO) --dist worksteal -m 'not site' --below 0.06 --arms few
 
 lint: style  ## style, types, layers and words
 	$(BIN)/pytest tests/docs/test_words.py

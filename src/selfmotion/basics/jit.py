@@ -19,6 +19,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from llvmlite.binding import get_host_cpu_features
 from numba.core import event
 
@@ -130,7 +131,9 @@ def kernel(function: _Function) -> _Function:
     NUMBA_DISABLE_JIT=1 kernels are interpreted, for a debugger.
     """
     if numba.config.DISABLE_JIT:
-        return function
+        # As compiled: what is not finite is found in what a kernel returns, and warned of nowhere.
+        interpreted: _Function = np.errstate(all="ignore")(function)
+        return interpreted
     try:
         compiled: _Function = numba.njit(cache=True, error_model="numpy")(function)
     except RuntimeError as error:
