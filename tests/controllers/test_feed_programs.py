@@ -692,11 +692,31 @@ def test_a_part_that_was_moved_is_moved_in_the_program_and_in_the_file(tmp_path:
     moved = "workpiece.frame.position=[0.45, 0.06, 0.2]"
     code, text, notes = in_full("check", file, "--robot", cell, "--set", moved)
     assert code == 0, text
-    assert "so is the path by which it is judged" in notes
+    assert "along the path where the file has it" in notes
     # With the part elsewhere again, and where the program stayed and the part did not.
     code, text = invoke("check", file, "--robot", cell, "--set", moved.replace("0.06", "0.03"))
     assert code == 1
     file.write_text(written)
     code, text = invoke("check", file, "--robot", cell, "--set", moved)
+    assert code == 1
+    assert "60 mm off the path" in text
+
+
+def test_targets_that_are_led_back_from_a_part_that_was_moved_are_off_its_path(
+    tmp_path: Path,
+) -> None:
+    """The tool goes where the plan has its path, and the part is elsewhere by now."""
+    cell, plan, file = tmp_path / "cell.toml", tmp_path / "weld.npz", tmp_path / "weld.mod"
+    cell.write_text(_CLAMPED)
+    sm.plan(sm.read_problem(cell)).require().save(plan)
+    asked = sm.files.ProgramSettings(mass=2.0, targets="poses", work_object="path")
+    sm.files.write_motion(sm.load_plan(plan), file, settings=asked)
+    text = file.read_text().replace('"", [[-450.0000, 0.0000,', '"", [[-450.0000, -60.0000,')
+    for x in ("0.0000", "80.0000"):
+        assert f"MoveL [[{x}, 0.0000," in text
+        # The frame of the controller's base is turned by half a turn.
+        text = text.replace(f"MoveL [[{x}, 0.0000,", f"MoveL [[{x}, -60.0000,")
+    file.write_text(text)
+    code, text = invoke("check", file, "--robot", plan)
     assert code == 1
     assert "60 mm off the path" in text

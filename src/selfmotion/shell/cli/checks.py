@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -179,16 +178,17 @@ def of_problem(
     if program is not None:
         problem = controllers.problem_of_targets(problem)
         ends = motions[0].of_joints(problem.robot.joint_names).q[[0, -1]]
-        given, problem = problem, controllers.as_shifted(problem, program, ends)
+        shifted = controllers.as_shifted(problem, program, ends[0])
+        is_moved = plan is not None or not controllers.is_nearer(problem, shifted, ends)
+        problem = shifted if is_moved else problem
         obstacles = any(item.obstacles for item in problem.requirements)
-        note = controllers.shift_note(program, moved=problem is not given, obstacles=obstacles)
+        note = controllers.shift_note(program, moved=is_moved, obstacles=obstacles)
         if note:
             stages.print(f"note: {note}", markup=False, soft_wrap=True)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         print_difference(problem.robot, motions[0])
     allowed, robot = content.within or tolerance, problem.robot
-    lines = replace(problem, constraints=controllers.constraints_of_lines(problem.constraints))
 
     def certify(each: sm.Problem, motion: sm.Trajectory) -> sm.Certificate:
         if asked.task is None:
@@ -198,8 +198,7 @@ def of_problem(
             robot, each.path, asked.task, motion, allowed, all_asked, progress=progress
         )
 
-    ways = (partial(certify, each) for each in (problem, lines))
-    certificate, motion = controllers.worst_certificate(motions, *ways)
+    certificate, motion = controllers.worst_certificate(problem, motions, certify)
     certificate = with_failures(certificate, against)
     return certificate, near(robot, motion, problem.requirements), robot, program
 

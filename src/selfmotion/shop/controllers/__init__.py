@@ -56,12 +56,12 @@ from selfmotion.shop.controllers.samples import (
 )
 from selfmotion.shop.controllers.shifted_work_objects import (
     as_shifted as as_shifted,
+    is_nearer as is_nearer,
     shift_note as shift_note,
 )
 from selfmotion.shop.controllers.step_judging import worst_certificate as worst_certificate
 from selfmotion.shop.controllers.switching_faults import switching_faults as switching_faults
 from selfmotion.shop.controllers.target_constraints import (
-    constraints_of_lines as constraints_of_lines,
     problem_of_targets as problem_of_targets,
 )
 from selfmotion.shop.controllers.work_objects import base_rotation_note as base_rotation_note

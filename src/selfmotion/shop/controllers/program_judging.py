@@ -6,8 +6,6 @@ had to keep (`step_judging`). The whole has to begin, end and switch its outputs
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path as FilePath
 
@@ -41,7 +39,6 @@ from selfmotion.shop.controllers.step_judging import (
 )
 from selfmotion.shop.controllers.switching_faults import switching_faults
 from selfmotion.shop.controllers.target_constraints import (
-    constraints_of_lines,
     constraints_of_targets,
     problem_of_targets,
 )
@@ -112,12 +109,11 @@ def judged_by_plan(program: ControllerProgram, plan: Plan) -> Certificate:
     Within the deviation that the program states. Its work object is where it was planned.
     """
     problem = problem_of_targets(plan.problem)
-    on_lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
     allowed, ending = stated_tolerance(program) or plan.tolerance, plan.report.ending
     certificate, _ = worst_certificate(
+        problem,
         program.motions(problem.path),
-        partial(problem.certify, tolerance=allowed, ending=ending),
-        partial(on_lines.certify, tolerance=allowed, ending=ending),
+        lambda each, motion: each.certify(motion, allowed, ending),
     )
     return certificate
 

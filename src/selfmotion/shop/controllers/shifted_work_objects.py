@@ -27,7 +27,7 @@ def shift_note(program: ControllerProgram, *, moved: bool = True, obstacles: boo
     ----------
     program : ControllerProgram
     moved : bool
-        Whether the path was shifted with it, see `as_shifted`.
+        Whether it is judged along the path shifted with it, see `is_nearer`.
     obstacles : bool
         Whether there are obstacles, which are not shifted.
     """
@@ -37,7 +37,7 @@ def shift_note(program: ControllerProgram, *, moved: bool = True, obstacles: boo
     turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
     off = f"the work object is {distance:.4g} mm and {turn:.3g}° from where it was planned"
     if not moved:
-        return f"{off}, and so is the path by which it is judged"
+        return f"{off}: judged along the path where the file has it, as the program goes there"
     text = f"{off}: judged along the path shifted with it"
     if not obstacles:
         return text
@@ -47,18 +47,15 @@ def shift_note(program: ControllerProgram, *, moved: bool = True, obstacles: boo
     )
 
 
-def as_shifted(problem: Problem, program: ControllerProgram, ends: Array) -> Problem:
+def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Problem:
     """Return a problem whose path is shifted as the work object of a program is.
-
-    A problem whose path is where the motion goes, as that of a file in which the part was moved,
-    stays as it is.
 
     Parameters
     ----------
     problem : Problem
     program : ControllerProgram
-    ends : (2, n)
-        Where the motion begins and ends.
+    begin : (n,)
+        Where the motion begins.
 
     Raises
     ------
@@ -75,10 +72,25 @@ def as_shifted(problem: Problem, program: ControllerProgram, ends: Array) -> Pro
             f"which moves past it: plan again with the part where it is"
         )
     path = Placed(problem.path, place * program.shift * place.inverse())
-    if _distance(problem, problem.path, ends) < _distance(problem, path, ends) - _SHIFT_TOLERANCE:
-        return problem
-    start = None if problem.start is None else ends[0]
+    start = None if problem.start is None else begin
     return replace(problem, path=path, start=start)
+
+
+def is_nearer(problem: Problem, shifted: Problem, ends: Array) -> bool:
+    """Return whether a motion goes where a problem's path is, and not where the shifted one is.
+
+    That is so where the part is where it is now in the file of the problem. A path of a plan or a
+    job is where it was planned, and is shifted whatever the motion.
+
+    Parameters
+    ----------
+    problem, shifted : Problem
+        See `as_shifted`.
+    ends : (2, n)
+        Where the motion begins and ends.
+    """
+    distances = [_distance(problem, path, ends) for path in (problem.path, shifted.path)]
+    return distances[0] < distances[1] - _SHIFT_TOLERANCE
 
 
 def _distance(problem: Problem, path: Path, ends: Array) -> float:

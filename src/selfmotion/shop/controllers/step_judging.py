@@ -9,7 +9,6 @@ worst one decides. Along straight lines only those constraints count that corner
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 from selfmotion.basics import ProblemError
 from selfmotion.certificate import Certificate, Tolerance
@@ -64,7 +63,7 @@ def step_verdicts(
         constraints = constraint_filter(planned.problem.constraints)
         problem = replace(planned.problem, constraints=constraints)
         if program is not None:
-            problem = as_shifted(problem, program, motions[0].q[[0, -1]])
+            problem = as_shifted(problem, program, motions[0].q[0])
         tolerance = seam_tolerance or planned.tolerance
         verdicts.append(_seam_verdict(step.name, problem, tolerance, motions))
     return tuple(verdicts)
@@ -97,11 +96,8 @@ def _seam_verdict(
     name: str, problem: Problem, tolerance: Tolerance, motions: Sequence[Trajectory]
 ) -> StepVerdict:
     """Return the verdict on the worst motion of a seam."""
-    on_lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
     certificate, _ = worst_certificate(
-        motions,
-        partial(problem.certify, tolerance=tolerance),
-        partial(on_lines.certify, tolerance=tolerance),
+        problem, motions, lambda each, motion: each.certify(motion, tolerance)
     )
     return StepVerdict(name, certificate.verified, certificate.verdict)
 
@@ -119,9 +115,9 @@ def _move_verdict(
 
 
 def worst_certificate(
+    problem: Problem,
     motions: Sequence[Trajectory],
-    certify_smooth: Callable[[Trajectory], Certificate],
-    certify_lines: Callable[[Trajectory], Certificate],
+    certify: Callable[[Problem, Trajectory], Certificate],
 ) -> tuple[Certificate, Trajectory]:
     """Return the worst certificate of the motions of a seam, and that motion.
 
@@ -130,19 +126,23 @@ def worst_certificate(
 
     Parameters
     ----------
+    problem : Problem
+        What a program of targets has to keep.
     motions : sequence of Trajectory
-        One per interpolation of the controller: first the smooth one, then those on straight lines.
-    certify_smooth, certify_lines : callable
-        How the smooth motion, and how the others are certified.
+        One per interpolation of the controller: first the smooth one, then those on straight lines,
+        which keep less (`constraints_of_lines`).
+    certify : callable
+        Returns the certificate of a motion of a problem.
 
     Raises
     ------
     ProblemError
         There is no motion.
     """
+    on_lines = replace(problem, constraints=constraints_of_lines(problem.constraints))
     worst: tuple[Certificate, Trajectory] | None = None
     for number, motion in enumerate(motions):
-        certificate = certify_lines(motion) if number else certify_smooth(motion)
+        certificate = certify(on_lines if number else problem, motion)
         if not certificate.verified:
             return _with_lines_remark(certificate) if number else certificate, motion
         if worst is None or certificate.position_error.value > worst[0].position_error.value:
