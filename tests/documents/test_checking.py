@@ -249,3 +249,15 @@ def test_a_margin_that_is_a_share_has_no_unit(kind: str, tmp_path: Path) -> None
     known = json_schema()["$defs"]
     assert "margin_deg" not in known[tables[kind].__name__]["properties"]
     assert "margin_deg" in known[tables["JointPositionLimits"].__name__]["properties"]
+
+
+@pytest.mark.parametrize(
+    ("text", "read"), [("010", "8"), ("-017", "-15"), ("1:30", "90"), ("1_0", "10"), ("0b11", "3")]
+)
+def test_numbers_that_yaml_reads_in_another_base_are_refused(
+    text: str, read: str, tmp_path: Path
+) -> None:
+    """A clearance of 010 mm is one of 8 mm to YAML 1.1, and of 10 mm to who wrote it."""
+    file = tmp_path / "a.yaml"
+    file.write_text(f"robot: {{name: panda}}\nclearance: {{distance_mm: {text}}}\n")
+    assert f"a.yaml: is not YAML: '{text}' is {read} in YAML 1.1" in complaint("plan", file)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Collection, Hashable, Iterable, Mapping
 from pathlib import Path
@@ -21,6 +22,8 @@ FORMER_CLEARANCE = "collision"
 # Largest depth of nested tables or lists; real files have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (_ANGLES, math.pi / 180.0), "_mm": (_LENGTHS, 1e-3)}
+# Numbers that YAML 1.1 reads in other bases, 010 as 8 and 1:30 as 90, or with underscores.
+_UNLIKE_DECIMALS = re.compile(r"[+-]?0[0-9b_]+|.*[:_].*")
 # Similarity at which an unknown key is taken for a known one.
 _ALIKE = 0.8
 
@@ -91,6 +94,17 @@ def _parse_yaml(file: Path, text: str) -> Any:
             _without_twins([(key, None) for key in keys if isinstance(key, Hashable)])
             return super().construct_mapping(node, deep=deep)
 
+        def construct_plain(self, node: Any) -> Any:
+            """Return a number; ValueError for one that YAML 1.1 reads otherwise than it looks."""
+            if _UNLIKE_DECIMALS.fullmatch(node.value):
+                raise ValueError(
+                    f"'{node.value}' is {loader.yaml_constructors[node.tag](self, node)} in YAML "
+                    f"1.1, and another number elsewhere; write it in decimal digits"
+                )
+            return loader.yaml_constructors[node.tag](self, node)
+
+    for tag in ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float"):
+        Loader.add_constructor(tag, Loader.construct_plain)
     try:
         _check_events(file, yaml.parse(text, Loader=loader))
         # `ros2 topic echo` ends each message with a line of its own.
